@@ -24,10 +24,9 @@ static Renderer *painters[PRECISION_COUNT];
 static inline Film image_render(const Scene *scene, const RenderSettings *settings)
 {
     Renderer **painter = &painters[settings->precision];
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     *painter = renderer_reopen(*painter, &probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     assert_non_null(*painter);
     Film film;
     assert_true(renderer_render_film(*painter, AOVS, &film));
@@ -44,11 +43,10 @@ static inline int painters_close(void **state)
 static inline Answer answer(const Scene *scene, const CertifySample *reference,
                             const RenderSettings *settings)
 {
-    Film film = image_render(scene, settings);
+    OwnedFilm film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(reference, &film);
     const Answer counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
                             film.rerenders.rerendered, film.rerenders.uncertified};
-    film_free(&film);
     return counted;
 }
 
@@ -69,16 +67,14 @@ static inline RenderSettings small_settings(uint32_t bounce_count)
 static inline size_t check_image(Scene *scene, const RenderSettings *settings, const char *what,
                                  double number)
 {
-    CertifySample reference;
+    OwnedCertifySample reference;
     assert_true(certify_sample_open(&reference, scene, settings, SMALL_SIDE * SMALL_SIDE));
-    Film film = image_render(scene, settings);
+    OwnedFilm film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(&reference, &film);
     if (errors.wrong_decided > 0)
         fail_msg("%s, %g: of the pixels not uncertified %zu are wrong, at most %zu of them in color", what,
                  number, errors.wrong_decided, errors.color);
     const size_t uncertified = (size_t)film.rerenders.uncertified;
-    film_free(&film);
-    certify_sample_close(&reference);
     scene_free(scene);
     return uncertified;
 }

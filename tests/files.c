@@ -115,9 +115,8 @@ Text file_text(const char *path)
 
 void check_content(const char *path, const char *expected)
 {
-    Text text = file_text(path);
+    OwnedText text = file_text(path);
     assert_string_equal(text_c(&text), expected);
-    text_free(&text);
 }
 
 mode_t mode_of(const char *path)

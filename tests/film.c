@@ -43,10 +43,9 @@ bool arithmetic_is_refused(Compute *compute, const RenderSettings *settings)
     if (needs_double && !compute_in_double(compute)->device->fp64) return false; // has no passport
     RenderSettings usual = *settings;
     usual.lanes = 0; // as test_passport, which fails where these are refused wrongly
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     const bool is_refused = !arithmetic_suits(compute, &usual, &messages) && messages.count > 0;
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     return is_refused;
 }
 
@@ -58,10 +57,9 @@ void skip_if_refused(Compute *compute, const RenderSettings *settings)
 Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs)
 {
     skip_if_refused(compute, settings);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     assert_non_null(renderer);
     Film film;
     assert_true(renderer_render_film(renderer, aovs, &film));

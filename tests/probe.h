@@ -20,11 +20,10 @@ static Compute probe_compute;
 static inline int probe_open(void **state)
 {
     (void)state;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     device_list_open(&probe_devices, NULL);
     const Device *device = device_choose(&probe_devices, getenv("GLINT_DEVICE"), &messages);
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     if (device == NULL) return -1;
     return compute_open(&probe_compute, device) ? 0 : -1;
 }
@@ -34,9 +33,8 @@ static inline int probe_close(void **state)
     (void)state;
     const bool ok = compute_ok(&probe_compute);
     if (!ok) {
-        char *failure = compute_failure_text(&probe_compute);
+        OWNED char *failure = compute_failure_text(&probe_compute);
         fprintf(stderr, "%s\n", failure);
-        free(failure);
     }
     compute_close(&probe_compute);
     device_list_close(&probe_devices);
@@ -55,10 +53,9 @@ static inline const Passport *probe_passport(void)
 // register or in memory.
 static inline Precision probe_sound_from(void)
 {
-    Text broken = {0};
+    OwnedText broken = {0};
     const Passport *passport = probe_passport();
     const bool is_sound = passport && !passport_broken(passport, &broken);
-    text_free(&broken);
     return is_sound ? PRECISION_SINGLE : PRECISION_STRICT;
 }
 
@@ -84,10 +81,9 @@ static inline bool probe_has(Precision precision)
 static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
 {
     skip_if_refused(&probe_compute, settings);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     return renderer;
 }
 
@@ -96,7 +92,7 @@ static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings 
 static inline cl_program probe_program(const char *text, uint32_t lanes, Precision precision, bool has_fma,
                                        uint32_t perturb_seed, const char *options)
 {
-    Text prelude = {0};
+    OwnedText prelude = {0};
     text_appendf(&prelude,
                  "#define LANES %u\n#define IS_STRICT %d\n#define IS_DOUBLE %d\n#define HAS_FMA %d\n"
                  "#define PERTURB %d\n#define REPAIRS_DIVIDE %d\n#define PERTURB_SEED %uu\n"
@@ -108,19 +104,16 @@ static inline cl_program probe_program(const char *text, uint32_t lanes, Precisi
     size_t file_count = 0;
     while (kernel_files[file_count].name)
         file_count++;
-    EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
+    OWNED EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
     memcpy(files, kernel_files, file_count * sizeof *files);
     files[file_count] = (EmbeddedFile){"probe.cl", text};
-    char *composed = kernel_compose(files, "probe.cl", text_c(&prelude));
+    OWNED char *composed = kernel_compose(files, "probe.cl", text_c(&prelude));
     if (composed == NULL) fault("a test's kernel cannot be composed");
     const char *source = composed;
     cl_int status;
     cl_program program = clCreateProgramWithSource(probe_compute.context, 1, &source, NULL, &status);
     compute_check_object(&probe_compute, program, status, "clCreateProgramWithSource");
     compute_try(&probe_compute, clBuildProgram(program, 1, &probe_compute.device->id, options, NULL, NULL));
-    free(composed);
-    free(files);
-    text_free(&prelude);
     return program;
 }
 

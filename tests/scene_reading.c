@@ -46,14 +46,12 @@ Text scene_messages(const char *name, const char *text, bool lenient)
 {
     Text source = {0}, described = {0};
     text_append(&source, text, strlen(text));
-    MessageList messages = {0};
-    Scene scene;
+    OwnedMessageList messages = {0};
+    OwnedScene scene;
     bool read = scene_read_text(&scene, name, &source, lenient, &messages);
     assert_int_equal(read, message_count(&messages, MESSAGE_ERROR) == 0);
     for (size_t i = 0; i < messages.count; i++)
         message_describe(&described, &messages.items[i]);
-    scene_free(&scene);
-    message_list_free(&messages);
     text_free(&source);
     return described;
 }
@@ -72,15 +70,13 @@ Scene scene_of_file(const char *path)
 
 Scene scene_of_text(const char *name, const char *text)
 {
-    Text source = {0};
+    OwnedText source = {0};
     text_append(&source, text, strlen(text));
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     bool read = scene_read_text(&scene, name, &source, false, &messages);
     if (!read) message_list_print(&messages, stderr);
     assert_true(read);
-    message_list_free(&messages);
-    text_free(&source);
     return scene;
 }
 

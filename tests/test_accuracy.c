@@ -49,7 +49,7 @@ static AccuracyErrors compare(const Film *reference, const Film *variant)
 
 TEST(test_edges)
 {
-    Film film = film_make();
+    OwnedFilm film = film_make();
     AccuracyEdges edges;
     accuracy_edges_find(&edges, &film);
     // columns 4 to 7 and 8 to 11
@@ -73,12 +73,11 @@ TEST(test_edges)
     assert_int_equal(edges.silhouette_pixels, 8);
     assert_true(edges.silhouette[at(2, 1)] && edges.silhouette[at(1, 2)] && !edges.silhouette[at(2, 2)]);
     accuracy_edges_free(&edges);
-    film_free(&film);
 }
 
 TEST(test_equal)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT);
@@ -88,13 +87,11 @@ TEST(test_equal)
     assert_true(errors.t_relative.largest == 0 && errors.normal.largest == 0);
     for (size_t type = 0; type < ACCURACY_MEASURE_COUNT; type++)
         assert_false(errors.worst[type].found);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_wrong_objects)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.object[at(5, 0)] = 1;
     variant.object[at(7, 6)] = UINT32_MAX;
     variant.color[3 * at(5, 0)] = 0.9;
@@ -124,13 +121,11 @@ TEST(test_wrong_objects)
     assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_OBJECT);
     assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_wrong_shadows)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
     variant.color[3 * at(0, 3)] = 0;
     AccuracyErrors errors = compare(&reference, &variant);
@@ -149,13 +144,11 @@ TEST(test_wrong_shadows)
     assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_wrong_paths)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.path[at(6, 1)] = 1;
     variant.path[at(1, 1)] = 2;
     variant.path[at(2, 1)] = 2;
@@ -166,13 +159,11 @@ TEST(test_wrong_paths)
     assert_int_equal(accuracy_faults(&errors), 0);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_shading)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.color[3 * at(0, 0)] += 0.25;
     variant.color[3 * at(3, 4) + 2] -= 0.125;
     variant.color[3 * at(11, 4)] += 0.375; // the background is not shaded
@@ -187,13 +178,11 @@ TEST(test_shading)
     assert_true(worst[ACCURACY_SHADING].x == 0 && worst[ACCURACY_SHADING].variant == 0.75);
     assert_true(worst[ACCURACY_IMAGE].x == 11 && worst[ACCURACY_IMAGE].y == 4);
     assert_int_equal(errors.display.off_by_more, 3);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_distances_and_normals)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
     // 10 degrees about y, and a tiny angle that the cosine cannot show
     const double angle = acos(-1) / 18, tiny = 1e-12;
@@ -217,13 +206,11 @@ TEST(test_distances_and_normals)
     normal[0] = (double)NAN;
     errors = compare(&reference, &variant);
     assert_true(isinf(errors.t_relative.largest) && isinf(errors.normal.largest));
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_unsound_pixels)
 {
-    Film reference = film_make(), variant = film_make();
+    OwnedFilm reference = film_make(), variant = film_make();
     variant.color[3 * at(3, 3)] = (double)NAN;
     variant.color[3 * at(3, 3) + 1] = -1; // counts for both
     variant.color[3 * at(4, 3) + 2] = -(double)INFINITY;
@@ -235,13 +222,11 @@ TEST(test_unsound_pixels)
     assert_int_equal(errors.image.count, 3 * PIXELS - 2);
     assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
-    film_free(&reference);
-    film_free(&variant);
 }
 
 TEST(test_colors_only)
 {
-    Film variant = film_make(), source = film_make();
+    OwnedFilm variant = film_make(), source = film_make();
     Film reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
     variant.color[3 * at(3, 3)] = 0.75;
     AccuracyVariant compared = {.errors = compare(&reference, &variant)};
@@ -250,8 +235,6 @@ TEST(test_colors_only)
     assert_non_null(accuracy_figure(&compared, ACCURACY_SHADING).why_not);
     assert_near(accuracy_figure(&compared, ACCURACY_IMAGE).value, 0.25 / sqrt(3.0 * PIXELS), 1e-16);
     assert_null(accuracy_figure(&compared, ACCURACY_FLIP).why_not);
-    film_free(&source);
-    film_free(&variant);
 }
 
 enum { VARIANTS = 5 };

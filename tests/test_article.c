@@ -87,29 +87,29 @@ static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
 
 TEST(sees_a_sphere_from_inside)
 {
-    Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 2\n\tcenter 0 0 0.5\n" MATERIAL);
+    OwnedScene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 2\n\tcenter 0 0 0.5\n" MATERIAL);
     Vector3 eye = scene.camera.position, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
     assert_true(hit.t == (Quad)2.5);
     assert_false(within_limits(article_sphere((Float3){0, 0, 0.5f}, 2, narrow(eye), narrow(forward))));
-    scene_free(&scene);
 }
 
 TEST(sees_a_cylinder_from_inside)
 {
-    Scene scene = read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
+    OwnedScene scene =
+        read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
     Vector3 eye = {0, 5, 0.5}, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
     assert_true(hit.t == (Quad)1.5);
     assert_false(within_limits(
         article_cylinder((Float3){0, 0, 0}, (Float3){0, 1, 0}, 2, narrow(eye), narrow(forward))));
-    scene_free(&scene);
 }
 
 TEST(looks_along_a_cylinder)
 {
-    Scene scene = read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 0 1\n" MATERIAL
-                                    "=>plane :\n{\n\tposition 0 0 7\n\tnormal 0 0 1\n" MATERIAL);
+    OwnedScene scene =
+        read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 0 1\n" MATERIAL
+                          "=>plane :\n{\n\tposition 0 0 7\n\tnormal 0 0 1\n" MATERIAL);
     Vector3 eye = {0.5, 0, 0}, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
     assert_int_equal(hit.object, 1);
@@ -123,26 +123,24 @@ TEST(looks_along_a_cylinder)
     assert_true(hit.t == 12288);
     float t = article_cylinder((Float3){0, 0, 0}, axis, 2, (Float3){0.5f, 0, 8}, narrow(nearly));
     assert_false(isfinite(t) && fabsf(t - 12288) < 1);
-    scene_free(&scene);
 }
 
 TEST(looks_along_a_cone)
 {
     // Half the angle between the axes: the side runs along (-1, 0, 1).
-    Scene scene = read_scene(
+    OwnedScene scene = read_scene(
         CAMERA "=>cone :\n{\n\tangle 0.78539816339744831\n\tcenter 0 0 0\n\tnormal 0 0 1\n" MATERIAL);
     Vector3 eye = {3, 0.5, 1}, along = {-1, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, along);
     assert_true(hit.t == (Quad)1.03125);
     float t = article_cone((Float3){0, 0, 0}, (Float3){0, 0, 1}, 0.78539816f, narrow(eye), narrow(along));
     assert_true(isnan(t));
-    scene_free(&scene);
 }
 
 TEST(turns_a_cones_normal_by_its_tangent)
 {
     const float angle = 1;
-    Scene scene = read_scene(CAMERA "=>cone :\n{\n\tangle 1\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
+    OwnedScene scene = read_scene(CAMERA "=>cone :\n{\n\tangle 1\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
     Vector3 eye = {0.25, 1, -5}, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
     // Its intersection is right here, its normal P - C - (1 + angle^2) ((P - C) . V) V is not.
@@ -153,7 +151,6 @@ TEST(turns_a_cones_normal_by_its_tangent)
     assert_true(reference_distance(vector_normalize(normal), hit.normal) > 0.3);
     Vector3 right = vector_subtract(point, (Vector3){0, (1 + tan(angle) * tan(angle)) * point.y, 0});
     assert_true(reference_distance(vector_normalize(right), hit.normal) < 1e-6);
-    scene_free(&scene);
 }
 
 static double cut(double value)
@@ -163,9 +160,9 @@ static double cut(double value)
 
 TEST(adds_light_before_it_cuts)
 {
-    Scene scene = read_scene(CAMERA "=>plane :\n{\n\tposition 0 0 4\n\tnormal 0 0 -1\n"
-                                    "\tcolor 109 59 19\n\tdiffuse 0.33 0.33 0.33\n\tspecular 0.4\n}\n"
-                                    "=>light :\n{\n\tposition 1 0 0\n\tintensity 0.7 0.7 0.7\n}\n");
+    OwnedScene scene = read_scene(CAMERA "=>plane :\n{\n\tposition 0 0 4\n\tnormal 0 0 -1\n"
+                                         "\tcolor 109 59 19\n\tdiffuse 0.33 0.33 0.33\n\tspecular 0.4\n}\n"
+                                         "=>light :\n{\n\tposition 1 0 0\n\tintensity 0.7 0.7 0.7\n}\n");
     float pixel[3] = {0};
     assert_true(probe_render(&scene, 1, 1, PRECISION_SINGLE, pixel));
     ReferenceRay ray = reference_camera_ray(&scene.camera, 1, 1, 0, 0);
@@ -179,13 +176,12 @@ TEST(adds_light_before_it_cuts)
     double highlight = 255 * 0.7 * 0.4 * pow(cosine, 30);
     assert_true(fabs(ambient + diffuse + highlight - 255 * expected.x) < 1e-9);
     assert_true(cut(ambient) + cut(diffuse) + cut(highlight) < cut(255 * expected.x));
-    scene_free(&scene);
 }
 
 TEST(sees_far_and_near)
 {
-    Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 10\n\tcenter 0 0 1000\n" MATERIAL
-                                    "=>sphere :\n{\n\tradius 1e-7\n\tcenter 0 0 -4e-7\n" MATERIAL);
+    OwnedScene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 10\n\tcenter 0 0 1000\n" MATERIAL
+                                         "=>sphere :\n{\n\tradius 1e-7\n\tcenter 0 0 -4e-7\n" MATERIAL);
     Vector3 eye = scene.camera.position, far = {0, 0, 1}, near = {0, 0, -1};
     assert_true(hit_of_both(&scene, eye, far).t == 990);
     float t = article_sphere((Float3){0, 0, 1000}, 10, narrow(eye), narrow(far));
@@ -193,7 +189,6 @@ TEST(sees_far_and_near)
     assert_true(fabs((double)hit_of_both(&scene, eye, near).t - 3e-7) < 1e-13);
     t = article_sphere((Float3){0, 0, -4e-7f}, 1e-7f, narrow(eye), narrow(near));
     assert_true(fabs(t - 3e-7) < 1e-12 && !within_limits(t));
-    scene_free(&scene);
 }
 
 // The number of lit pixels in an image's middle row and middle column.
@@ -205,7 +200,7 @@ enum { WIDTH = 128, HEIGHT = 72 };
 
 TEST(keeps_a_sphere_round)
 {
-    Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 9\n" MATERIAL);
+    OwnedScene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 9\n" MATERIAL);
     static float image[HEIGHT][WIDTH][3];
     assert_true(probe_render(&scene, WIDTH, HEIGHT, PRECISION_SINGLE, &image[0][0][0]));
     Extent seen = {0}, expected = {0}, article = {0};
@@ -229,7 +224,6 @@ TEST(keeps_a_sphere_round)
     assert_int_equal(seen.across, seen.down);
     assert_int_equal(expected.across, expected.down);
     assert_true(article.across > article.down + article.down / 2);
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

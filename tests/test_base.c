@@ -37,13 +37,11 @@ static char *printed(const MessageList *messages)
 
 static void check_message(const char *bytes, size_t offset, const char *expected)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Source source = {"a.yaml", bytes, strlen(bytes)};
     message_add_at(&messages, MESSAGE_ERROR, &source, offset, "bad %s", "word");
-    char *text = printed(&messages);
+    OWNED char *text = printed(&messages);
     assert_string_equal(text, expected);
-    free(text);
-    message_list_free(&messages);
 }
 
 TEST(test_message_place)
@@ -84,9 +82,8 @@ TEST(test_message_without_place)
     message_error(&messages, "three");
     assert_int_equal(message_count(&messages, MESSAGE_WARNING), 1);
     assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
-    char *text = printed(&messages);
+    OWNED char *text = printed(&messages);
     assert_string_equal(text, "glint: warning: one?2?\nglint: error: three\n");
-    free(text);
     message_list_free(&messages);
     assert_int_equal(messages.count, 0);
 }
@@ -174,12 +171,11 @@ TEST(test_array)
 TEST(test_read_failures)
 {
     MessageList messages = {0};
-    Text text = {0};
+    OwnedText text = {0};
     assert_false(text_read_file(&text, "nothing", &messages));
     check_only_message(&messages, "cannot read 'nothing': No such file or directory");
     assert_false(text_read_file(&text, ".", &messages));
     check_only_message(&messages, "cannot read '.': Is a directory");
-    text_free(&text);
 }
 
 // These replace libc's functions.
@@ -469,25 +465,22 @@ TEST(test_base64)
         {"\xFB\xFF", "+/8="},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        Text text = {0};
+        OwnedText text = {0};
         base64_append(&text, (const uint8_t *)cases[i][0], strlen(cases[i][0]));
-        Text bytes = {0};
+        OwnedText bytes = {0};
         assert_true(base64_decode(&bytes, text.items, text.count));
         assert_string_equal(text_c(&bytes), cases[i][0]);
-        text_free(&bytes);
         assert_string_equal(text_c(&text), cases[i][1]);
-        text_free(&text);
     }
 }
 
 static void stage_check(Stage *stage, const char *expected)
 {
-    Text text = {0};
+    OwnedText text = {0};
     double seconds = -1;
     assert_int_equal(stage_write(stage, &text, &seconds), expected[0] != '\0');
     assert_string_equal(text_c(&text), expected);
     if (expected[0]) assert_true(seconds >= 0);
-    text_free(&text);
 }
 
 TEST(test_stage)

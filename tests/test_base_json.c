@@ -25,22 +25,18 @@ static void check_text(const char *value, const char *expected)
 {
     Json *json = json_open();
     json_text(json, "key", value);
-    char *printed = json_printed(json), *whole;
+    OWNED char *printed = json_printed(json), *whole;
     assert_true(asprintf(&whole, "{\n  \"key\": %s\n}\n", expected) > 0);
     assert_string_equal(printed, whole);
-    free(whole);
-    free(printed);
 }
 
 static void check_key(const char *key, const char *expected)
 {
     Json *json = json_open();
     json_none(json, key);
-    char *printed = json_printed(json), *whole;
+    OWNED char *printed = json_printed(json), *whole;
     assert_true(asprintf(&whole, "{\n  %s: null\n}\n", expected) > 0);
     assert_string_equal(printed, whole);
-    free(whole);
-    free(printed);
 }
 
 TEST(test_text_that_looks_like_something_else)
@@ -118,13 +114,12 @@ static double number_back(double value)
 {
     Json *json = json_open();
     json_number(json, "n", value);
-    char *printed = json_printed(json);
+    OWNED char *printed = json_printed(json);
     const char *start = strstr(printed, "\"n\": ");
     assert_non_null(start);
     char *end;
     double back = strtod(start + 5, &end);
     assert_string_equal(end, "\n}\n");
-    free(printed);
     return back;
 }
 
@@ -155,7 +150,7 @@ TEST(test_number_words)
     json_bool(json, NULL, false);
     json_text(json, NULL, NULL);
     json_end(json);
-    char *printed = json_printed(json);
+    OWNED char *printed = json_printed(json);
     assert_string_equal(printed, "{\n"
                                  "  \"all\": [\n"
                                  "    0.1,\n"
@@ -173,7 +168,6 @@ TEST(test_number_words)
                                  "    null\n"
                                  "  ]\n"
                                  "}\n");
-    free(printed);
 }
 
 TEST(test_nesting)
@@ -220,7 +214,7 @@ TEST(test_deep_nesting)
     json_begin_array(json, "deep");
     for (int i = 0; i < DEPTH; i++)
         json_begin_array(json, NULL);
-    char *printed = json_printed(json);
+    OWNED char *printed = json_printed(json);
     json_error_t error;
     json_t *root = json_loads(printed, 0, &error);
     const json_t *innermost = json_object_get(root, "deep");
@@ -229,7 +223,6 @@ TEST(test_deep_nesting)
         innermost = json_array_get(innermost, 0);
     assert_int_equal(depth, DEPTH);
     json_decref(root);
-    free(printed);
 }
 
 static long allocations_left; // before one of jansson's fails

@@ -60,14 +60,13 @@ static BenchTimes times_make(size_t runs, double rate)
 
 TEST(test_events_that_agree)
 {
-    BenchTimes times = times_make(30, 1.001);
+    OwnedBenchTimes times = times_make(30, 1.001);
     assert_null(bench_clock_fault(&times));
     assert_near(bench_kernel(&times).median, 0.030 * 1.001, 1e-12);
     assert_near(series_summarize(&times.processor).median, 0.06, 1e-12);
     assert_int_equal(bench_kernel(&times).count, 30);
     assert_true(bench_converged(&times, 30));
     assert_false(bench_converged(&times, 31));
-    bench_times_free(&times);
 }
 
 TEST(test_clock_that_drifts)
@@ -91,7 +90,7 @@ TEST(test_stalled_launches)
     static const double rates[] = {1, 1.009, 0.991, 1.02, 0.98};
     for (unsigned stalled = 0; stalled < 1u << 4; stalled++)
         for (size_t i = 0; i < COUNT_OF(rates); i++) {
-            BenchTimes times = {0};
+            OwnedBenchTimes times = {0};
             for (unsigned k = 0; k < LAUNCHES; k++) {
                 LaunchTime launch = launch_at(5 + 0.1 * k, 0.010, rates[i]);
                 const unsigned which = k == 0 ? 1 : k == LAUNCHES - 1 ? 2 : k == 9 ? 4 : k % 2 ? 8 : 0;
@@ -99,27 +98,25 @@ TEST(test_stalled_launches)
                 bench_add_launch(&times, &launch);
             }
             assert_true((bench_clock_fault(&times) != NULL) == (fabs(rates[i] - 1) > 0.01));
-            bench_times_free(&times);
         }
 }
 
 // One event that cannot be trusted makes the whole row use the host's clock.
 TEST(test_event_without_times)
 {
-    BenchTimes times = times_make(30, 1);
+    OwnedBenchTimes times = times_make(30, 1);
     LaunchTime zeros = {.host_seconds = 0.030, .host_start_seconds = 9};
     bench_add_launch(&times, &zeros);
     bench_end_run(&times, 0.045, 0.06);
     assert_string_equal(bench_clock_fault(&times), "the runtime reports no times for events");
     assert_near(bench_kernel(&times).min, 0.030, 1e-12);
-    bench_times_free(&times);
 }
 
 // Returns the verdict on runs whose launches and processor time change by these factors after a part of them.
 static Verdict drift_verdict(bool is_cpu, int run_count, double part, double launch_change,
                              double processor_change)
 {
-    BenchTimes times = {0};
+    OwnedBenchTimes times = {0};
     for (int i = 0; i < run_count; i++) {
         const bool is_late = i >= part * run_count;
         const double noise = i == run_count / 8 ? 3 : 1 + 0.002 * (i % 5); // and a run next to something else
@@ -128,7 +125,6 @@ static Verdict drift_verdict(bool is_cpu, int run_count, double part, double lau
         bench_end_run(&times, 0.045, 0.06 * noise * (is_late ? processor_change : 1));
     }
     const Comparison drift = bench_drift(&times, is_cpu, 10);
-    bench_times_free(&times);
     return drift.verdict;
 }
 
@@ -148,14 +144,13 @@ TEST(test_drift)
 
 TEST(test_runs_that_scatter)
 {
-    BenchTimes times = {0};
+    OwnedBenchTimes times = {0};
     for (int i = 0; i < 40; i++) {
         LaunchTime launch = launch_at(i, i % 2 ? 0.010 : 0.011, 1);
         bench_add_launch(&times, &launch);
         bench_end_run(&times, 0.045, 0.06);
     }
     assert_false(bench_converged(&times, 20));
-    bench_times_free(&times);
 }
 
 static BenchRow row_make(void)
@@ -194,7 +189,7 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     assert_true(descriptor >= 0);
     assert_int_equal(write(descriptor, text, strlen(text)), strlen(text));
     snprintf(path, sizeof path, "/proc/self/fd/%d", descriptor);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Baseline *baseline = baseline_open(path, true, &messages);
     *error_count = message_count(&messages, MESSAGE_ERROR);
     if (*error_count) {
@@ -204,7 +199,6 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
         assert_string_equal(messages.items[0].text, expected);
         free(expected);
     }
-    message_list_free(&messages);
     close(descriptor);
     return baseline;
 }

@@ -155,7 +155,7 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
     if (!probe_has(precision)) return;
     RenderSettings settings = film_settings(width, height, precision);
     settings.bounce_count = trial->bounce_count;
-    Film film = film_render(&probe_compute, scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, scene, &settings, 0);
     const double u = unit_roundoff(precision);
     size_t wrong = 0, open = 0;
     for (unsigned i = 0; i < width * height; i++) {
@@ -173,7 +173,6 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
                 trial->name, precision_names[precision], i % width, i / width, error, excuse, seen.x, seen.y,
                 seen.z, expected[i].x, expected[i].y, expected[i].z);
     }
-    film_free(&film);
     assert_int_equal(wrong, 0);
     assert_true(open < OPEN_AT_MOST);
 }
@@ -181,7 +180,7 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
 static void shows_what_the_reference_shows(void **state)
 {
     const Trial *trial = *state;
-    Scene scene = scene_of_text("bounces.yaml", trial->text);
+    OwnedScene scene = scene_of_text("bounces.yaml", trial->text);
     static Color expected[PIXELS_MAX];
     const ReferencePath path = {.bounce_count = trial->bounce_count};
     for (unsigned i = 0; i < width * height; i++) {
@@ -190,7 +189,6 @@ static void shows_what_the_reference_shows(void **state)
     }
     for (Precision precision = PRECISION_SINGLE; precision < ARITHMETIC_COUNT; precision++)
         compare(trial, &scene, expected, precision);
-    scene_free(&scene);
 }
 
 int main(int argument_count, char **arguments)

@@ -139,10 +139,10 @@ TEST(no_hit_depends_on_the_tree)
                 {PRECISION_DOUBLE, 20000, 200000}};
     random_state.state = 1;
     size_t all_different = 0;
-    Scene scene = random_scene(few_or_many(1000, 10000));
+    OwnedScene scene = random_scene(few_or_many(1000, 10000));
     size_t most = few_or_many(runs[0].few, runs[0].many);
-    TraceRay *rays = memory_allocate(most, sizeof *rays);
-    TraceHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
+    OWNED TraceRay *rays = memory_allocate(most, sizeof *rays);
+    OWNED TraceHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
     rays_fill(rays, most, &scene);
     for (size_t run = 0; run < COUNT_OF(runs); run++) {
         if (!probe_has(runs[run].precision)) continue;
@@ -168,10 +168,6 @@ TEST(no_hit_depends_on_the_tree)
         all_different += different;
     }
     assert_int_equal(all_different, 0);
-    free(rays);
-    free(on);
-    free(off);
-    scene_free(&scene);
 }
 
 enum { PACKET = 16, PACKETS = 1000 };
@@ -219,12 +215,12 @@ static size_t hits_differ(const TraceRay *rays, const TraceHit *hits, const Trac
 TEST(rays_may_look_behind_their_start)
 {
     random_state.state = 7;
-    Scene scene = random_scene(4000);
+    OwnedScene scene = random_scene(4000);
     const uint32_t plane = (uint32_t)scene.objects.count - 1;
     enum { COUNT = PACKETS * PACKET };
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
-    TraceHit *expected = memory_allocate(COUNT, sizeof *expected),
-             *hits = memory_allocate(COUNT, sizeof *hits);
+    OWNED TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
+    OWNED TraceHit *expected = memory_allocate(COUNT, sizeof *expected),
+                   *hits = memory_allocate(COUNT, sizeof *hits);
     rays_behind_fill(rays, &scene);
     const Precision precisions[] = {probe_same_bits_from(), PRECISION_DOUBLE};
     if (!probe_has(precisions[0])) skip();
@@ -246,10 +242,6 @@ TEST(rays_may_look_behind_their_start)
     assert_true(behind > COUNT / 32);
     assert_true(dimmed > COUNT / 32);
     assert_int_equal(different, 0);
-    free(rays);
-    free(expected);
-    free(hits);
-    scene_free(&scene);
 }
 
 // Closed meshes
@@ -348,10 +340,10 @@ TEST(closed_meshes_do_not_leak)
     static const double radii[] = {1, 2};
     random_state.state = 31;
     size_t count = few_or_many(6000, 1000000), plain_count = few_or_many(320, 20000);
-    TraceRay *rays = memory_allocate(count, sizeof *rays);
-    TraceHit *hits = memory_allocate(count, sizeof *hits);
+    OWNED TraceRay *rays = memory_allocate(count, sizeof *rays);
+    OWNED TraceHit *hits = memory_allocate(count, sizeof *hits);
     for (size_t place = 0; place < 2; place++) {
-        Scene scene = closed_scene(centers[place], radii[place]);
+        OwnedScene scene = closed_scene(centers[place], radii[place]);
         for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (!probe_has(precision)) continue;
             rays_at_seams(rays, count, &scene.meshes.items[0], centers[place], precision == PRECISION_DOUBLE);
@@ -365,10 +357,7 @@ TEST(closed_meshes_do_not_leak)
                              precision_names[precision], bvh_choice_names[bvh], place);
             }
         }
-        scene_free(&scene);
     }
-    free(rays);
-    free(hits);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -108,11 +108,10 @@ static void tree_check(const Bounds *boxes, const uint8_t *types, size_t count, 
     stage_begin(stage, "building", NULL, count + 1);
     stage_set(stage, 1);
     bvh_build(&bvh, boxes, types, count, leaves, stage);
-    Text text = {0};
+    OwnedText text = {0};
     double seconds;
     stage_write(stage, &text, &seconds);
     assert_string_equal(text_c(&text), "building 100%");
-    text_free(&text);
     stage_close(stage);
     TreeCheck check = {&bvh, boxes, types, memory_allocate_zeroed(count, 1), 0, 0};
     node_check(&check, 0, 1);
@@ -175,16 +174,14 @@ TEST(any_boxes_make_a_tree)
     static const size_t counts[SET_COUNT] = {65536, 65536, 100001, 50000, 50000, 20000, 20000, 50000};
     for (int set = 0; set < SET_COUNT; set++) {
         size_t count = counts[set];
-        Bounds *boxes = memory_allocate(count, sizeof *boxes);
-        uint8_t *types = memory_allocate_zeroed(count, 1);
+        OWNED Bounds *boxes = memory_allocate(count, sizeof *boxes);
+        OWNED uint8_t *types = memory_allocate_zeroed(count, 1);
         for (size_t i = 0; i < count; i++)
             boxes[i] = box_of_set(set, i, count);
         trees_check(boxes, types, count);
         for (size_t i = 0; i < count; i++)
             types[i] = (uint8_t)(random_bits(&random_state) % TYPE_COUNT);
         trees_check(boxes, types, count);
-        free(boxes);
-        free(types);
     }
 }
 
@@ -253,7 +250,7 @@ TEST(planets_stay_outside_the_tree)
     } skies[] = {{{0.5, 15.9}, 2}, {{0.5, 16.1}, 1}, {{17, 18}, 2}, {{17, 600}, 0}};
     enum { HOUSES = 30 };
     for (size_t i = 0; i < COUNT_OF(skies); i++) {
-        Text text = {0};
+        OwnedText text = {0};
         text_appendf(&text, "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\nobjects:\n");
         for (size_t k = 0; k < 2; k++)
             text_appendf(&text, "  - sphere: {center: [0, %g, 0], radius: %g}\n", -skies[i].radii[k],
@@ -261,18 +258,15 @@ TEST(planets_stay_outside_the_tree)
         for (int k = 0; k < HOUSES; k++)
             text_appendf(&text, "  - sphere: {center: [%g, 0.1, 0], radius: 0.1}\n",
                          0.9 * (2.0 * k / (HOUSES - 1) - 1));
-        Scene scene = scene_of_text("town.yaml", text_c(&text));
+        OwnedScene scene = scene_of_text("town.yaml", text_c(&text));
         const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-        CompiledScene compiled = scene_compiled(&scene, &settings);
+        OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
         assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], HOUSES + skies[i].in_tree);
         // the first two objects, the larger one last
         const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
         for (uint32_t k = 0; k < 2; k++)
             assert_int_equal(entries[k].type_index_material.y < HOUSES + skies[i].in_tree,
                              k < skies[i].in_tree);
-        compiled_scene_free(&compiled);
-        scene_free(&scene);
-        text_free(&text);
     }
 }
 
@@ -280,17 +274,15 @@ TEST(planets_stay_outside_the_tree)
 TEST(points_make_a_tree)
 {
     enum { POINTS = 100000 };
-    Scene scene = scene_of_text("points.yaml", "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\n"
-                                               "objects:\n"
-                                               "  - sphere: {center: [0, -3, 0], radius: 2}\n");
+    OwnedScene scene = scene_of_text("points.yaml", "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\n"
+                                                    "objects:\n"
+                                                    "  - sphere: {center: [0, -3, 0], radius: 2}\n");
     for (int i = 0; i < POINTS; i++)
         array_push(scene.objects, ((Object){.type = SHAPE_TRIANGLE}));
     const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-    CompiledScene compiled = scene_compiled(&scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.bvh_counts[TYPE_TRIANGLES], POINTS);
     assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], 0);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 TEST_MAIN(NULL, NULL)

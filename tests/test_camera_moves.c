@@ -117,11 +117,11 @@ TEST(camera_turns_and_flies)
 
 static void check_yaml(const Camera *camera)
 {
-    Text text = {0};
+    OwnedText text = {0};
     camera_write_yaml(&text, camera, 1.5);
     text_appendf(&text, "lights: [{point: {position: [0, 0, 0]}}]\n"
                         "objects: [{sphere: {center: [0, 0, 0], radius: 1}}]\n");
-    Scene scene = scene_of_text("camera.yaml", text_c(&text));
+    OwnedScene scene = scene_of_text("camera.yaml", text_c(&text));
     const Camera *read = &scene.camera;
     assert_memory_equal(&read->position, &camera->position, sizeof(Vector3));
     assert_memory_equal(&read->look_at, &camera->look_at, sizeof(Vector3));
@@ -135,8 +135,6 @@ static void check_yaml(const Camera *camera)
     assert_true(read->lens.distance == camera->lens.distance);
     assert_int_equal(read->lens.focus, camera->lens.focus);
     assert_memory_equal(&read->lens.point, &camera->lens.point, sizeof(Vector3));
-    scene_free(&scene);
-    text_free(&text);
 }
 
 TEST(yaml_gives_the_same_camera)
@@ -170,11 +168,10 @@ TEST(yaml_gives_the_same_camera)
     check_yaml(&panorama);
     camera.half_tangent = portable_tangent(50 * (M_PI / 360));
     camera.position = (Vector3){0.1, 1e300, -40};
-    Text text = {0};
+    OwnedText text = {0};
     camera_write_yaml(&text, &camera, 1.5);
     assert_string_equal(text_c(&text), "camera: {position: [0.1, 1e+300, -40], look_at: [0.5, 1, 0.25], "
                                        "up: [0.1, 2, 0], fov: 50}\n");
-    text_free(&text);
 }
 
 #define REST "objects: [] # none\n"
@@ -186,22 +183,20 @@ static void check_written(const char *text, const uint32_t *frame, const char *e
     const Camera camera = {
         .position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}, .half_tangent = 0.5};
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
-    Text replaced;
+    OwnedText replaced;
     MessageList messages = {0};
     assert_int_equal(camera_replace(&replaced, &source, &camera, frame, &messages), expected != NULL);
     assert_int_equal(messages.count, expected == NULL);
     message_list_free(&messages);
     if (!expected) return;
     assert_string_equal(text_c(&replaced), expected);
-    Scene scene;
+    OwnedScene scene;
     const Source written = {.file = "scene.yaml", .bytes = expected, .length = strlen(expected)};
     assert_true(scene_read_yaml(&scene, &written, &(SceneOptions){.frame = frame ? *frame : 0}, &messages));
     assert_true(vectors_equal(scene.camera.position, camera.position));
     assert_true(vectors_equal(scene.camera.look_at, camera.look_at));
     assert_true(vectors_equal(scene.camera.up, camera.up));
     message_list_free(&messages);
-    scene_free(&scene);
-    text_free(&replaced);
 }
 
 static void check_replaced(const char *text, const char *expected)

@@ -41,13 +41,12 @@ static void hit_check(const ReferenceScene *reference, const TraceRay *ray, cons
 static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
 {
     Counts counts = {0};
-    TraceHit *hits = memory_allocate(count, sizeof *hits);
+    OWNED TraceHit *hits = memory_allocate(count, sizeof *hits);
     assert_true(probe_trace(scene, PRECISION_CERTIFIED, 0, rays, count, hits));
     ReferenceScene reference = reference_scene_open(scene);
     for (size_t i = 0; i < count; i++)
         hit_check(&reference, &rays[i], &hits[i], &counts);
     reference_scene_close(&reference);
-    free(hits);
     return counts;
 }
 
@@ -64,10 +63,10 @@ TEST(every_shape_is_certain)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { RAYS = 3000 };
-    TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
+    OWNED TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
     Counts sum = {0};
     for (uint64_t seed = 1; seed <= (tests_are_long() ? 200 : 4); seed++) {
-        Scene scene = random_scene(seed, 48);
+        OwnedScene scene = random_scene(seed, 48);
         Random random = {seed};
         for (size_t i = 0; i < RAYS; i++) {
             const double far = exp2(random_between(&random, -4, i % 4 ? 5 : 16));
@@ -76,9 +75,7 @@ TEST(every_shape_is_certain)
             ray_set(&rays[i], origin, vector_scale(vector_subtract(target, origin), length));
         }
         counts_add(&sum, rays_check(&scene, rays, RAYS));
-        scene_free(&scene);
     }
-    free(rays);
     printf("%zu certain, %zu in double, %zu uncertain, %zu hits\n", sum.certain, sum.in_double, sum.uncertain,
            sum.hits);
     assert_true(sum.certain > 20 * (sum.in_double + sum.uncertain));
@@ -138,7 +135,7 @@ TEST(rays_along_axes_and_sides_are_certain)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { RAYS = 500 };
-    TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
+    OWNED TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
     Random random = {5};
     Counts sum = {0};
     const unsigned scene_count = tests_are_long() ? 600 : 12;
@@ -160,7 +157,6 @@ TEST(rays_along_axes_and_sides_are_certain)
         Scene scene = scene_of_shapes(&object, 1, &material);
         counts_add(&sum, rays_check(&scene, rays, RAYS));
     }
-    free(rays);
     printf("%zu certain, %zu in double, %zu uncertain, %zu hits\n", sum.certain, sum.in_double, sum.uncertain,
            sum.hits);
     assert_true(sum.certain > sum.in_double + sum.uncertain && sum.hits > sum.certain / 4);
@@ -239,9 +235,10 @@ TEST(least_and_largest_numbers)
     Material material;
     Scene scene = scene_of_shapes(objects, 3, &material);
     enum { RAYS = 6000 };
-    TraceRay *rays = memory_allocate(RAYS, sizeof *rays), *scaled = memory_allocate(RAYS, sizeof *scaled);
-    TraceHit *hits = memory_allocate(RAYS, sizeof *hits);
-    int *exponents = memory_allocate(RAYS, sizeof *exponents);
+    OWNED TraceRay *rays = memory_allocate(RAYS, sizeof *rays),
+                   *scaled = memory_allocate(RAYS, sizeof *scaled);
+    OWNED TraceHit *hits = memory_allocate(RAYS, sizeof *hits);
+    OWNED int *exponents = memory_allocate(RAYS, sizeof *exponents);
     Random random = {11};
     for (size_t i = 0; i < RAYS; i++) {
         const double size = exp2(floor(random_between(&random, i % 2 ? -1074 : -160, i % 3 ? 40 : 1000)));
@@ -263,10 +260,6 @@ TEST(least_and_largest_numbers)
     printf("%zu certain, %zu in double, %zu uncertain\n", counts.certain, counts.in_double, counts.uncertain);
     assert_true(counts.certain > RAYS / 8 && counts.uncertain > 0);
     reference_scene_close(&reference);
-    free(exponents);
-    free(hits);
-    free(scaled);
-    free(rays);
 }
 
 // A sphere's tangent, a start on a sphere, and two coincident spheres are uncertain. Rays whose targets lie

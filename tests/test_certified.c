@@ -317,11 +317,11 @@ static void check_family(Family family)
     size_t single_wrong = 0, compared = 0;
     uint64_t rerendered = 0, uncertified = 0;
     for (unsigned seed = 0; seed < scene_count; seed++) {
-        Scene scene = scene_attacking(family, seed);
+        OwnedScene scene = scene_attacking(family, seed);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
         if (tests_are_long()) settings.extra_features = family_features[family]; // one program
         settings.bounce_count = bounce_counts[family];
-        CertifySample reference;
+        OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
@@ -338,8 +338,6 @@ static void check_family(Family family)
             uncertified += certified.uncertified;
         }
         compared += reference.count;
-        certify_sample_close(&reference);
-        scene_free(&scene);
     }
     const double samples = (double)(compared * (tests_are_long() ? 3 : 2)),
                  rerendered_share = (double)rerendered / samples,
@@ -446,7 +444,7 @@ TEST(terminators_of_ovals_are_decided)
     uint64_t rerendered = 0;
     const unsigned scene_count = tests_are_long() ? 100 : 10;
     for (unsigned seed = 0; seed < scene_count; seed++) {
-        Scene scene = scene_attacking(FLAT, 0);
+        OwnedScene scene = scene_attacking(FLAT, 0);
         scene.objects.count = scene.lights.count = 0;
         random_state.state = seed + 1;
         array_push(scene.objects, oval_before_eye(&scene, seed));
@@ -469,7 +467,7 @@ TEST(terminators_of_ovals_are_decided)
         }
         assert_int_equal(scene.lights.count, LIGHTS);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-        CertifySample reference;
+        OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
@@ -479,8 +477,6 @@ TEST(terminators_of_ovals_are_decided)
             fail_msg("scene %u: %zu pixels are wrong, %zu of them not uncertified", seed, certified.wrong,
                      certified.wrong_decided);
         rerendered += certified.rerendered;
-        certify_sample_close(&reference);
-        scene_free(&scene);
     }
     print_message("single has %zu wrong, %.4f of the samples re-rendered\n", single_wrong,
                   (double)rerendered / (double)(scene_count * WIDTH * HEIGHT));
@@ -496,7 +492,7 @@ typedef struct {
 static void picture_compare(void *context, const Scene *scene, const RenderSettings *settings)
 {
     Pictures *pictures = context;
-    CertifySample reference;
+    OwnedCertifySample reference;
     assert_true(certify_sample_open(&reference, scene, settings, 400));
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
@@ -508,7 +504,6 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     pictures->compared += reference.count;
     pictures->wrong += found.wrong;
     pictures->wrong_decided += found.wrong_decided;
-    certify_sample_close(&reference);
 }
 
 static bool case_print(void *context, const VerifyResult *result)

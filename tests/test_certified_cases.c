@@ -129,14 +129,13 @@ TEST(thin_walls_are_decided)
                    ((Object){.type = SHAPE_SPHERE, .material = 1, .as.sphere = {center, 1 - wall}}));
         RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_SINGLE);
         settings.bounce_count = 6;
-        CertifySample reference;
+        OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, SMALL_SIDE * SMALL_SIDE));
         const Precision last = tests_are_long() ? PRECISION_STRICT : PRECISION_SINGLE;
         for (; settings.precision <= last; settings.precision++) {
             const Answer found = answer(&scene, &reference, &settings);
             assert_int_equal(found.wrong == 0, i == 0);
         }
-        certify_sample_close(&reference);
         assert_true(check_small(&scene, 6, "a bubble with a thin wall", wall) < SMALL_SIDE);
     }
 }
@@ -154,11 +153,10 @@ TEST(needles_have_an_area)
                    ((Object){.type = SHAPE_TRIANGLE,
                              .as.triangle.vertices = {{far, far, -1}, {0, 0, -1}, {0.25, 0, -1}}}));
         RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_DOUBLE);
-        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
         size_t seen = 0;
         for (size_t i = 0; i < SMALL_SIDE * SMALL_SIDE; i++)
             seen += film.color[3 * i] != 0.25; // not the background
-        film_free(&film);
         assert_int_not_equal(seen, 0);
         const size_t uncertified = check_small(&scene, 0, "a strip", far);
         if (far < 1e13) assert_true(uncertified < 3 * SMALL_SIDE); // farther off all may be
@@ -215,7 +213,7 @@ TEST(slim_triangles_are_seldom_rerendered)
     for (unsigned seed = 0; seed < 2; seed++) {
         random_state.state = seed;
         const bool is_mirror = seed == 0;
-        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.2);
+        OwnedScene scene = scene_seen_from((Vector3){0, 0, 0}, 0.2);
         array_push(scene.materials, material_default());
         Material *sheet = &scene.materials.items[0], *wall = &scene.materials.items[1];
         *(is_mirror ? &sheet->reflection.largest : &sheet->transmission.largest) = 0.8;
@@ -232,14 +230,12 @@ TEST(slim_triangles_are_seldom_rerendered)
         point_light_add(&scene, (Vector3){3, 5, 0}, 1);
         RenderSettings settings = film_settings(SIDE, SIDE, PRECISION_CERTIFIED);
         settings.bounce_count = 2;
-        CertifySample reference;
+        OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, SIDE * SIDE));
         const Answer found = answer(&scene, &reference, &settings);
         print_message("%zu of %u samples re-rendered\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);
         assert_true(found.rerendered < 64);
-        certify_sample_close(&reference);
-        scene_free(&scene);
     }
 }
 
@@ -264,20 +260,18 @@ TEST(fine_meshes_are_seldom_rerendered)
             mesh.triangle_count += 2;
         }
     mesh_make_normals(&mesh);
-    Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.25);
+    OwnedScene scene = scene_seen_from((Vector3){0, 0, 0}, 0.25);
     array_push(scene.meshes, mesh);
     array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
     point_light_add(&scene, (Vector3){6, 5, -3}, 1);
     RenderSettings settings = small_settings(0);
     settings.width = settings.height = settings.region_width = settings.region_height = 100;
-    Film film = image_render(&scene, &settings);
+    OwnedFilm film = image_render(&scene, &settings);
     print_message("%zu of %u pixels re-rendered\n", (size_t)film.rerenders.rerendered, 100 * 100);
     size_t seen = 0;
     for (size_t i = 0; i < 100 * 100; i++)
         seen += film.color[3 * i] != 0.25; // not the background
     assert_true(seen > 5000 && film.rerenders.rerendered > 0 && film.rerenders.rerendered < 60);
-    film_free(&film);
-    scene_free(&scene);
 }
 
 // Returns a shape of this size in front of the eye.

@@ -15,9 +15,10 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
                              CertifyUncertified *uncertified)
 {
     const RenderSettings settings = film_settings(WIDTH * scale, HEIGHT * scale, precision);
-    CertifySample reference;
+    OwnedCertifySample reference;
     assert_true(certify_sample_open(&reference, scene, &settings, count));
-    Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG);
+    OwnedFilm film =
+        film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG);
     const CertifyErrors errors = certify_compare(&reference, &film);
     size_t uncertain = 0;
     for (size_t i = 0; i < reference.count; i++)
@@ -25,8 +26,6 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
     assert_int_equal(errors.compared, reference.count - uncertain);
     assert_true(uncertain < reference.count / 10);
     if (uncertified) *uncertified = certify_uncertified(scene, &film, &settings, count / 10 + 1);
-    film_free(&film);
-    certify_sample_close(&reference);
     return errors;
 }
 
@@ -42,13 +41,12 @@ TEST(the_best_precision_is_right)
     const char *const paths[] = {"scenes/demo.yaml", "scenes/mirror-glass.yaml", "scenes/paraboloids.yaml",
                                  "scenes/triangles.yaml"};
     for (size_t i = 0; i < (tests_are_long() ? 4 : 3); i++) {
-        Scene scene = scene_of_file(paths[i]);
+        OwnedScene scene = scene_of_file(paths[i]);
         const CertifyErrors errors =
             certify(&scene, has_double ? PRECISION_DOUBLE : PRECISION_STRICT, 1, 600, NULL);
         print_message("%s\n", paths[i]);
         assert_true(wrong_pixels(&errors) <= (has_double ? 0 : 2));
         assert_true(!has_double || errors.right_color < 1e-10);
-        scene_free(&scene);
     }
 }
 
@@ -56,7 +54,7 @@ TEST(the_best_precision_is_right)
 TEST(tilted_normals_are_decided)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "tilted.yaml",
         "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
         "lights: [{point: {position: [8, 0, 2]}}, {point: {position: [3, 1, -4]}}]\n"
@@ -69,14 +67,13 @@ TEST(tilted_normals_are_decided)
     assert_true(errors.right_color < 1e-10);
     const CertifyErrors certified = certify(&scene, PRECISION_CERTIFIED, 1, 600, NULL);
     assert_int_equal(wrong_pixels(&certified), 0);
-    scene_free(&scene);
 }
 
 // Spheres around the zenith, the nadir and the seam, and shapes in all directions.
 TEST(panoramas_are_right)
 {
     const bool has_double = probe_has(PRECISION_DOUBLE);
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "panorama.yaml",
         "camera: {position: [0.1, 1, 0.2], look_at: [1, 1.3, -2], up: [0.1, 1, 0], projection: "
         "equirectangular}\n"
@@ -93,20 +90,19 @@ TEST(panoramas_are_right)
         certify(&scene, has_double ? PRECISION_DOUBLE : PRECISION_STRICT, 1, PIXELS, NULL);
     assert_true(wrong_pixels(&errors) <= (has_double ? 0 : 2));
     assert_true(!has_double || errors.right_color < 1e-10);
-    scene_free(&scene);
 }
 
 // The reference knows the ambient light that is the mean of a sky's image.
 TEST(skies_light_the_reference)
 {
-    Scene scene = scene_of_text("sky.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
-                                            "background: {image: scenes/images/globe.png, intensity: 0.7}\n"
-                                            "lights: [{directional: {direction: [1, -1, 2]}}]\n"
-                                            "objects: [{sphere: {center: [0, 0, 0], radius: 2}}]\n");
+    OwnedScene scene =
+        scene_of_text("sky.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
+                                  "background: {image: scenes/images/globe.png, intensity: 0.7}\n"
+                                  "lights: [{directional: {direction: [1, -1, 2]}}]\n"
+                                  "objects: [{sphere: {center: [0, 0, 0], radius: 2}}]\n");
     assert_true(vector_largest(scene.ambient) > 0.1);
     const CertifyErrors errors = certify(&scene, PRECISION_STRICT, 1, PIXELS, NULL);
     assert_int_equal(errors.color, 0);
-    scene_free(&scene);
 }
 
 static void colors_compare(const Scene *scene, uint32_t scale)
@@ -122,12 +118,11 @@ static void colors_compare(const Scene *scene, uint32_t scale)
 TEST(colors_of_certified_are_exact)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    Scene scene = scene_of_file("scenes/article.yaml");
+    OwnedScene scene = scene_of_file("scenes/article.yaml");
     if (tests_are_long()) colors_compare(&scene, 6);
     scene.camera.look_at = (Vector3){-1.6947, 1.4227, 0.2414}; // the edge of the cone
     scene.camera.half_tangent /= 30;
     colors_compare(&scene, 1);
-    scene_free(&scene);
 }
 
 // A camera whose vectors rounding turns by a ten-thousandth, a blocker just before a light, and glass just
@@ -136,7 +131,7 @@ TEST(colors_of_certified_are_exact)
 TEST(there_are_no_false_alarms)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "near.yaml",
         "camera: {position: [0.3, 2.1, -5], look_at: [1, 0.4, 0.7], up: [0.7, -1.7, 5.70000000005], fov: "
         "50}\n"
@@ -155,7 +150,6 @@ TEST(there_are_no_false_alarms)
         assert_int_equal(errors.wrong_decided + errors.unconfirmed + errors.contradicted, 0);
         assert_true(errors.compared > 6000 && uncertified.count < 600);
     }
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

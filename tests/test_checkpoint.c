@@ -82,7 +82,7 @@ static void read_checked(Checkpoint *checkpoint, uint32_t first_row)
 {
     Values values;
     const Film expected = band_make(&values, first_row);
-    Film band;
+    OwnedFilm band;
     assert_true(checkpoint_read(checkpoint, first_row, &band));
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         assert_int_equal(band.layers[layer] != NULL, expected.layers[layer] != NULL);
@@ -92,7 +92,6 @@ static void read_checked(Checkpoint *checkpoint, uint32_t first_row)
     }
     assert_int_equal(band.first_row, first_row);
     assert_int_equal(band.light_count, expected.light_count);
-    film_free(&band);
 }
 
 // Makes a file with all bands, the last first. Returns its bytes.
@@ -116,19 +115,19 @@ static size_t file_size(void)
 TEST(test_bands_are_read_again)
 {
     Text bytes = file_make();
+    text_free(&bytes);
     Checkpoint *checkpoint = open_checked();
     assert_int_equal(band_count(checkpoint), BANDS);
     for (uint32_t i = 0; i < BANDS; i++)
         read_checked(checkpoint, i * BAND_ROWS);
     close_checked(checkpoint, true);
     assert_int_not_equal(access(path, F_OK), 0); // the image is complete
-    text_free(&bytes);
 }
 
 // If the file is cut off at any byte, it has the bands before that byte, and a render resumes from them.
 TEST(test_torn_writes)
 {
-    Text bytes = file_make();
+    OwnedText bytes = file_make();
     size_t header_size, kept = 0;
     unlink(path);
     close_checked(open_checked(), false);
@@ -148,13 +147,12 @@ TEST(test_torn_writes)
         }
         close_checked(checkpoint, false);
     }
-    text_free(&bytes);
 }
 
 // A wrong byte ends the bands that are used.
 TEST(test_wrong_bytes)
 {
-    Text bytes = file_make();
+    OwnedText bytes = file_make();
     unlink(path);
     close_checked(open_checked(), false);
     const size_t header_size = file_size(), record_size = (bytes.count - header_size) / BANDS;
@@ -166,7 +164,6 @@ TEST(test_wrong_bytes)
         close_checked(checkpoint, false);
         bytes.items[at] ^= 0x10;
     }
-    text_free(&bytes);
 }
 
 static void append_film(const Film *band)
@@ -210,22 +207,19 @@ TEST(test_other_sizes)
 // Expects a refusal with a reason, which leaves the file unchanged.
 static void refused(const char *other_key, const char *reason)
 {
-    Text before = file_text(path);
-    MessageList messages = {0};
+    OwnedText before = file_text(path);
+    OwnedMessageList messages = {0};
     assert_null(checkpoint_open(path, other_key, &film, &messages));
     assert_int_equal(messages.count, 1);
     if (!strstr(messages.items[0].text, reason)) fail_msg("%s", messages.items[0].text);
-    message_list_free(&messages);
-    Text after = file_text(path);
+    OwnedText after = file_text(path);
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.items, after.items, before.count);
-    text_free(&before);
-    text_free(&after);
 }
 
 TEST(test_refusals)
 {
-    Text bytes = file_make();
+    OwnedText bytes = file_make();
     unlink(path);
     close_checked(open_checked(), false);
     const size_t header_size = file_size();
@@ -247,13 +241,11 @@ TEST(test_refusals)
     bytes.items[16]++; // the format
     file_write_bytes(path, bytes.items, bytes.count);
     refused(key, "is not a checkpoint of this version of glint");
-    text_free(&bytes);
 
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     assert_null(checkpoint_open("/dev/null", key, &film, &messages));
     assert_null(checkpoint_open("/nowhere/file", key, &film, &messages));
     assert_int_equal(messages.count, 2);
-    message_list_free(&messages);
 }
 
 // A symbolic link stays. The file behind it is removed, and the next render creates it.
@@ -289,14 +281,13 @@ int __wrap_unlink(const char *name)
 TEST(test_a_file_that_stays)
 {
     Checkpoint *checkpoint = open_checked();
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     removal_fails = true;
     checkpoint_close(checkpoint, true, &messages);
     removal_fails = false;
     assert_int_equal(messages.count, 1);
     assert_non_null(strstr(messages.items[0].text, "cannot remove the checkpoint"));
     assert_non_null(strstr(messages.items[0].text, strerror(EPERM)));
-    message_list_free(&messages);
     assert_int_equal(unlink(path), 0);
 }
 

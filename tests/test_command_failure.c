@@ -81,12 +81,10 @@ TEST(test_commands)
 
 static void assert_same_bytes(const char *one, const char *other)
 {
-    Text first = file_text(one), second = file_text(other);
+    OwnedText first = file_text(one), second = file_text(other);
     assert_true(first.count > 0);
     assert_int_equal(first.count, second.count);
     assert_memory_equal(first.items, second.items, first.count);
-    text_free(&first);
-    text_free(&second);
 }
 
 // If one of two devices fails, or the scene does not fit it, there is a warning and the same image. If both

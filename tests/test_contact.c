@@ -99,10 +99,9 @@ static Bounds contact_of(const Scene *scene)
 {
     const CompileSettings settings = {
         .width = 1, .height = 1, .sample_count = 1, .extra_features = FEATURE_TRANSMISSION};
-    CompiledScene compiled = scene_compiled(scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(scene, &settings);
     const SceneHeader *header = compiled.arrays[FLAT_HEADER].items;
     Bounds contact = {vector3_of(&header->contact_low), vector3_of(&header->contact_high)};
-    compiled_scene_free(&compiled);
     return contact;
 }
 
@@ -119,7 +118,7 @@ static void check_beyond(const char *name, double value, double bound)
 static void holds_where_they_touch(void **state)
 {
     const Trial *trial = *state;
-    Scene scene = scene_of_text("contact.yaml", formatted(STAGE "%s", trial->objects));
+    OwnedScene scene = scene_of_text("contact.yaml", formatted(STAGE "%s", trial->objects));
     Bounds contact = contact_of(&scene);
     assert_int_equal(bounds_is_empty(&contact), !trial->touch);
     if (trial->touch) {
@@ -130,7 +129,6 @@ static void holds_where_they_touch(void **state)
         check_beyond(trial->name, contact.max.y, trial->high.y);
         check_beyond(trial->name, contact.max.z, trial->high.z);
     }
-    scene_free(&scene);
 }
 
 // With enough pairs, all opaque objects count as one box, which is unbounded if many of them are.
@@ -138,7 +136,7 @@ TEST(many_pairs_hold_as_much)
 {
     enum { SPHERE_COUNT = 1500 };
     for (int unbounded = 0; unbounded <= 1; unbounded++) {
-        Text text = {0};
+        OwnedText text = {0};
         text_appendf(&text, STAGE);
         for (int i = 0; i < SPHERE_COUNT; i++) {
             text_appendf(&text, "  - sphere: {center: [%d, 0, -4], radius: 0.5, material: glass}\n", 4 * i);
@@ -149,7 +147,7 @@ TEST(many_pairs_hold_as_much)
                 text_appendf(&text, "  - sphere: {center: [%d, 1, -4], radius: 0.5, material: chalk}\n",
                              4 * i);
         }
-        Scene scene = scene_of_text("contact.yaml", text_c(&text));
+        OwnedScene scene = scene_of_text("contact.yaml", text_c(&text));
         Bounds contact = contact_of(&scene);
         if (unbounded) {
             assert_true(contact.max.y >= UNBOUNDED && contact.min.y <= -UNBOUNDED);
@@ -160,8 +158,6 @@ TEST(many_pairs_hold_as_much)
             assert_true(contact.min.y <= 0.5 && contact.min.y >= 0.5 - reach * 0x1p-12);
             assert_true(contact.max.y >= 0.5 && contact.max.y <= 0.5 + reach * 0x1p-12);
         }
-        scene_free(&scene);
-        text_free(&text);
     }
 }
 

@@ -103,7 +103,7 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
 {
     size_t scalar = trial->is_double ? sizeof(double) : sizeof(float),
            lines_size = SPHERES_PER_ORIGIN * 6 * scalar;
-    char *lines = memory_allocate(SPHERES_PER_ORIGIN * 6, scalar);
+    OWNED char *lines = memory_allocate(SPHERES_PER_ORIGIN * 6, scalar);
     for (size_t i = 0; i < (size_t)SPHERES_PER_ORIGIN * 6; i++) {
         if (trial->is_double)
             ((double *)(void *)lines)[i] = trial->lines[i];
@@ -116,7 +116,7 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
         flat_array_at(cull_spheres, (common_origin - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
         SPHERES_PER_ORIGIN, cull_spheres->layout};
     size_t row_size = flat_array_size(&row, trial->is_double);
-    void *row_bytes = memory_allocate(row_size, 1);
+    OWNED void *row_bytes = memory_allocate(row_size, 1);
     flat_array_write(&row, trial->is_double, row_bytes);
 
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "misses");
@@ -136,8 +136,6 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
     for (size_t i = 0; i < 4; i++)
         buffer_release(buffers[i]);
     clReleaseKernel(kernel);
-    free(row_bytes);
-    free(lines);
 }
 
 static long double dot(const long double *a, const long double *b)

@@ -75,7 +75,7 @@ TEST(test_sky)
     static const double elevations[] = {90, 20, 3, -6};
     for (int turbidity = (int)TURBIDITY_MIN; turbidity <= (int)TURBIDITY_MAX; turbidity += 8)
         for (size_t i = 0; i < 4; i++) {
-            Image image = daylight_image(elevations[i], turbidity, (Color){0.1, 0.2, 0.3});
+            OwnedImage image = daylight_image(elevations[i], turbidity, (Color){0.1, 0.2, 0.3});
             const size_t count = 3 * (size_t)image.width * image.height;
             for (size_t k = 0; k < count; k++)
                 assert_true(image.values[k] >= 0 && image.values[k] < 10);
@@ -84,7 +84,6 @@ TEST(test_sky)
                     assert_memory_equal(texel_at(&image, x, y), texel_at(&image, image.width - 1 - x, y),
                                         3 * sizeof(float));
             hash = hash_bytes(hash, image.values, count * sizeof(float));
-            image_free(&image);
         }
     // All systems must have the same bits. Where a change is meant, the test prints the new number.
     if (hash != UINT64_C(0x3219593998230211))
@@ -102,13 +101,11 @@ static void check_texel(const Image *image, uint32_t x, uint32_t y, double red, 
 // Expected is what the model's formulas give in numpy.
 TEST(test_sky_values)
 {
-    Image noon = daylight_image(60, 4.5, vector_all(0)), evening = daylight_image(3, 4.5, vector_all(0));
+    OwnedImage noon = daylight_image(60, 4.5, vector_all(0)), evening = daylight_image(3, 4.5, vector_all(0));
     check_texel(&noon, 255, 0, 0.369279, 0.532920, 0.907717);
     check_texel(&noon, 300, 60, 0.546172, 0.690949, 1.037275);
     check_texel(&evening, 256, 127, 0.601355, 0.340054, 0.035432);
     check_texel(&evening, 10, 100, 0.068967, 0.068715, 0.056575);
-    image_free(&noon);
-    image_free(&evening);
 }
 
 // The brightest texel above the horizon is the sun's, or the one next to it.
@@ -116,23 +113,21 @@ TEST(test_sky_is_brightest_at_the_sun)
 {
     static const double elevations[] = {60, 20, 3};
     for (size_t i = 0; i < 3; i++) {
-        Image image = daylight_image(elevations[i], 3, vector_all(0));
+        OwnedImage image = daylight_image(elevations[i], 3, vector_all(0));
         uint32_t x_best = 0, y_best = 0;
         for (uint32_t y = 0; y < image.height; y++)
             for (uint32_t x = 0; x < image.width; x++)
                 if (texel_at(&image, x, y)[1] > texel_at(&image, x_best, y_best)[1]) x_best = x, y_best = y;
         assert_int_equal(x_best, image.width / 2 - 1); // the first of two that mirror each other
         assert_near(90 - (y_best + 0.5) * 180 / image.height, elevations[i], 0.71);
-        image_free(&image);
     }
 }
 
 static double redness(double elevation, uint32_t degrees)
 {
-    Image image = daylight_image(elevation, 3, vector_all(0));
+    OwnedImage image = daylight_image(elevation, 3, vector_all(0));
     const float *texel = texel_at(&image, image.width / 2, (90 - degrees) * image.height / 180 - 1);
     const double red = (double)(texel[0] / texel[2]);
-    image_free(&image);
     return red;
 }
 
@@ -141,15 +136,12 @@ TEST(test_sky_colors)
     assert_true(redness(3, 1) > 3 && redness(3, 1) > 2 * redness(20, 1) && redness(20, 1) > redness(60, 1));
     assert_true(redness(60, 45) < 0.8); // blue at noon
     // a sun that sets and dusk are continuous, and night is dark
-    Image set = daylight_image(0, 3, vector_all(0.2)), dusk = daylight_image(-0.001, 3, vector_all(0.2)),
-          night = daylight_image(-18, 3, vector_all(0.2));
+    OwnedImage set = daylight_image(0, 3, vector_all(0.2)), dusk = daylight_image(-0.001, 3, vector_all(0.2)),
+               night = daylight_image(-18, 3, vector_all(0.2));
     for (size_t i = 0; i < 3 * (size_t)set.width * set.height; i++) {
         assert_near((double)dusk.values[i], (double)set.values[i], 0.002);
         assert_true(night.values[i] < 1e-6F);
     }
-    image_free(&set);
-    image_free(&dusk);
-    image_free(&night);
 }
 
 static Scene scene_of_background(const char *background)
@@ -171,10 +163,9 @@ TEST(test_scene)
     assert_vector(scene.lights.items[0].direction, -across, -0.5, 0); // it is in the east
     assert_vector(scene.sky.forward, 1, 0, 0);
     assert_int_equal(scene.lights.items[0].area.type, AREA_NONE);
-    Image image = daylight_image(30, 5, vector_all(0.2));
+    OwnedImage image = daylight_image(30, 5, vector_all(0.2));
     assert_memory_equal(scene.textures.items[scene.sky.texture - 1].image.values, image.values,
                         3 * sizeof(float) * image.width * image.height);
-    image_free(&image);
     assert_true(scene.ambient.z > scene.ambient.x && scene.ambient.x > 0.2 && scene.ambient.z < 1);
     scene_free(&scene);
 
@@ -201,14 +192,14 @@ TEST(test_scene)
 // Seen from above, with north at the top, the shadow of a post points away from the sun.
 TEST(test_shadow)
 {
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "post.yaml", "camera: {position: [0, 40, 0], look_at: [0, 0, 0], up: [0, 0, -1], fov: 12}\n"
                      "background: {sun: {elevation: 30, azimuth: 60}}\n"
                      "objects:\n"
                      "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                      "  - cylinder: {from: [0, 0, 0], to: [0, 2, 0], radius: 0.1}\n");
     const RenderSettings settings = film_settings(64, 64, PRECISION_STRICT);
-    Film film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
     double east = 0, north = 0;
     size_t count = 0;
     for (size_t y = 0; y < 64; y++)
@@ -220,8 +211,6 @@ TEST(test_shadow)
         }
     assert_true(count > 20);
     assert_near(atan2(-east, -north) * 180 / M_PI, 60, 2);
-    film_free(&film);
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -64,9 +64,9 @@ static void check_display_round_trip(const char *path, uint32_t channels, Transf
 {
     ImageHeader header = {image_format_of(path), 37, 41, channels, transfer, bits, 'f', notes};
     uint32_t count = 37 * 41 * channels;
-    float *values = values_make(count);
+    OWNED float *values = values_make(count);
     image_write_file(path, &header, values, sizeof *values);
-    Image image = image_read_file(path);
+    OwnedImage image = image_read_file(path);
     assert_int_equal(image.width, 37);
     assert_int_equal(image.height, 41);
     assert_int_equal(image.channels, channels);
@@ -75,8 +75,6 @@ static void check_display_round_trip(const char *path, uint32_t channels, Transf
     float maximum = bits == 8 ? 255.0F : 65535.0F;
     for (uint32_t i = 0; i < count; i++)
         assert_true(image.values[i] == (float)image_quantize(values[i], transfer, bits) / maximum);
-    image_free(&image);
-    free(values);
 }
 
 TEST(test_display_formats)
@@ -96,19 +94,17 @@ static void check_float_round_trip(const char *path, uint32_t channels)
 {
     ImageHeader header = {image_format_of(path), 37, 41, channels, TRANSFER_SRGB, 8, 'f', notes};
     uint32_t count = 37 * 41 * channels;
-    float *values = values_make(count);
+    OWNED float *values = values_make(count);
     values[3] = INFINITY;
     values[4] = NAN;
     values[5] = 1e30F;
     image_write_file(path, &header, values, sizeof *values);
-    Image image = image_read_file(path);
+    OwnedImage image = image_read_file(path);
     assert_int_equal(image.width, 37);
     assert_int_equal(image.height, 41);
     assert_int_equal(image.channels, channels);
     assert_false(image.display);
     assert_memory_equal(image.values, values, count * sizeof *values);
-    image_free(&image);
-    free(values);
 }
 
 TEST(test_float_formats)
@@ -126,9 +122,8 @@ TEST(test_small_exr)
     const float value = 0.375F;
     ImageHeader header = {IMAGE_EXR, 1, 1, 1, TRANSFER_SRGB, 8, 'f', NULL};
     image_write_file("small.exr", &header, &value, sizeof value);
-    Image image = image_read_file("small.exr");
+    OwnedImage image = image_read_file("small.exr");
     assert_true(image.width == 1 && image.height == 1 && image.channels == 1 && image.values[0] == value);
-    image_free(&image);
 }
 
 TEST(test_npy_types)
@@ -160,10 +155,9 @@ TEST(test_doubles_keep_their_bits)
     header.npy_type = 'f';
     image_write_file("f.npy", &header, floats, sizeof *floats);
     for (int i = 0; i < 2; i++) {
-        Image image = image_read_file(i ? "f.npy" : "d.npy");
+        OwnedImage image = image_read_file(i ? "f.npy" : "d.npy");
         for (size_t k = 0; k < 3; k++)
             assert_true(image_value(&image, k) == (i ? (double)floats[k] : doubles[k]));
-        image_free(&image);
     }
 }
 
@@ -188,9 +182,8 @@ TEST(test_npy_bytes)
 TEST(test_png_notes)
 {
     ImageHeader header = {IMAGE_PNG, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
-    float *values = values_make(60);
+    OWNED float *values = values_make(60);
     image_write_file("notes.png", &header, values, sizeof *values);
-    free(values);
     FILE *file = fopen("notes.png", "rb");
     assert_non_null(file);
     png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
@@ -214,9 +207,8 @@ TEST(test_png_notes)
 TEST(test_exr_notes)
 {
     ImageHeader header = {IMAGE_EXR, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
-    float *values = values_make(60);
+    OWNED float *values = values_make(60);
     image_write_file("notes.exr", &header, values, sizeof *values);
-    free(values);
     exr_context_t context;
     assert_int_equal(exr_start_read(&context, "notes.exr", NULL), EXR_ERR_SUCCESS);
     for (const ImageNote *note = notes; note->key; note++) {
@@ -250,7 +242,7 @@ static ImageWriter *writer_of_8_by_40(const char *path, MessageList *messages)
 
 TEST(test_abandoned_leaves_the_old_file)
 {
-    float *values = values_make(8 * 40 * 3);
+    OWNED float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
         old_file_make(path, sizeof path, endings[i]);
@@ -263,16 +255,15 @@ TEST(test_abandoned_leaves_the_old_file)
         check_content(path, "old");
         check_no_messages(&messages);
     }
-    free(values);
 }
 
 // Every write to /dev/full fails as on a full disk; enough rows that no buffer holds them all.
 TEST(test_disk_full)
 {
     enum { SIDE = 256 };
-    float *values = values_make(SIDE * SIDE * 3);
+    OWNED float *values = values_make(SIDE * SIDE * 3);
     for (size_t i = 0; i < 4; i++) {
-        MessageList messages = {0};
+        OwnedMessageList messages = {0};
         ImageHeader header = {image_format_of(endings[i]), SIDE, SIDE, 3, TRANSFER_SRGB, 16, 'f', notes};
         header.format = (ImageFormat)i;
         ImageWriter *writer = image_writer_open("/dev/full", &header, &messages);
@@ -283,14 +274,12 @@ TEST(test_disk_full)
         }
         assert_int_equal(messages.count, 1);
         assert_string_equal(messages.items[0].text, "cannot write '/dev/full': No space left on device");
-        message_list_free(&messages);
     }
-    free(values);
 }
 
 TEST(test_finished_is_yet_to_be_renamed)
 {
-    float *values = values_make(8 * 40 * 3);
+    OWNED float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
         old_file_make(path, sizeof path, endings[i]);
@@ -307,13 +296,11 @@ TEST(test_finished_is_yet_to_be_renamed)
                 image_writer_abandon(writer);
             assert_int_equal(folder_count(""), before);
         }
-        Image image;
+        OwnedImage image;
         assert_true(image_read(&image, path, NULL, &messages));
         assert_int_equal(image.height, 40);
-        image_free(&image);
         check_no_messages(&messages);
     }
-    free(values);
 }
 
 static const char colors_path[] = "colors.png";
@@ -348,19 +335,17 @@ static void colors_write(const char *profile, double gamma, const double *primar
 // Reads the PNG, and expects one warning that starts so, or none.
 static void check_warning(const char *path, const char *expected)
 {
-    MessageList messages = {0};
-    Image image;
+    OwnedMessageList messages = {0};
+    OwnedImage image;
     assert_true(image_read(&image, path, NULL, &messages));
     assert_int_equal(messages.count, expected ? 1 : 0);
     if (expected && !strstr(messages.items[0].text, expected)) fail_msg("%s", messages.items[0].text);
-    image_free(&image);
-    message_list_free(&messages);
 }
 
 static void check_layer(const char *layer, const void *expected, uint32_t channels, bool is_integer)
 {
     MessageList messages = {0};
-    Image image;
+    OwnedImage image;
     assert_true(image_read(&image, "layers.exr", &(ImageReadOptions){.layer = layer}, &messages));
     check_no_messages(&messages);
     assert_int_equal(image.width, 4);
@@ -372,13 +357,13 @@ static void check_layer(const char *layer, const void *expected, uint32_t channe
         const float *floats = expected;
         assert_true(image_value(&image, i) == (is_integer ? integers[i] : (double)floats[i]));
     }
-    image_free(&image);
 }
 
 TEST(test_exr_layers)
 {
     enum { PIXELS = 4 * 33 };
-    float *color = values_make(3 * PIXELS), *vectors = values_make(3 * PIXELS), *alpha = values_make(PIXELS);
+    OWNED float *color = values_make(3 * PIXELS), *vectors = values_make(3 * PIXELS),
+                *alpha = values_make(PIXELS);
     uint32_t numbers[PIXELS], masks[2 * PIXELS];
     for (uint32_t i = 0; i < PIXELS; i++) {
         numbers[i] = UINT32_MAX - i * i * i;
@@ -394,7 +379,7 @@ TEST(test_exr_layers)
     ImageHeader header = {IMAGE_EXR, 4, 33, 3, TRANSFER_NONE, 8, 'f', NULL};
     header.layers = layers;
     header.layer_count = COUNT_OF(layers);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     ImageWriter *writer = image_writer_open("layers.exr", &header, &messages);
     assert_non_null(writer);
     for (uint32_t row = 0; row < 33; row += 11) { // blocks have 16 rows
@@ -410,10 +395,6 @@ TEST(test_exr_layers)
     check_layer("number", numbers, 1, true);
     Image image;
     assert_false(image_read(&image, "layers.exr", &(ImageReadOptions){.layer = "mask"}, &messages));
-    message_list_free(&messages);
-    free(color);
-    free(vectors);
-    free(alpha);
 }
 
 TEST(test_png_of_other_colors)
@@ -451,12 +432,11 @@ static void jpeg_write(const char *path, const char *segments, size_t length, in
     assert_int_equal(tjCompress2(encoder, pixels[0][0], WIDTH, 4 * WIDTH, HEIGHT, pixel_format, &bytes,
                                  &count, TJSAMP_444, 95, 0),
                      0);
-    Text text = {0};
+    OwnedText text = {0};
     text_append(&text, (const char *)bytes, 2); // start of image
     text_append(&text, segments, length);
     text_append(&text, (const char *)bytes + 2, count - 2);
     file_write_bytes(path, text.items, text.count);
-    text_free(&text);
     tjFree(bytes);
     tjDestroy(encoder);
 }
@@ -472,7 +452,7 @@ TEST(test_jpeg_is_turned_upright)
         segment[29] = (char)orientation;
         jpeg_write("turned.jpg", segment, sizeof segment - 1, TJPF_RGBX);
         MessageList messages = {0};
-        Image image;
+        OwnedImage image;
         assert_true(image_read(&image, "turned.jpg", NULL, &messages));
         check_no_messages(&messages);
         const bool is_upright = orientation < 5 || orientation > 8;
@@ -484,7 +464,6 @@ TEST(test_jpeg_is_turned_upright)
             const float value = image.values[(y * image.width + x) * 3];
             assert_float_equal(value, (float)(80 * expected[i]) / 255, 0.02F);
         }
-        image_free(&image);
     }
 }
 
@@ -615,12 +594,11 @@ TEST(test_text_pixmap)
 {
     const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
     file_write_bytes("text.ppm", bytes, sizeof bytes - 1);
-    Image image = image_read_file("text.ppm");
+    OwnedImage image = image_read_file("text.ppm");
     assert_int_equal(image.width, 2);
     assert_int_equal(image.channels, 3);
     const float expected[] = {0, 0.25F, 0.5F, 0.75F, 1, 0.25F};
     assert_memory_equal(image.values, expected, sizeof expected);
-    image_free(&image);
 }
 
 TEST_MAIN(folder_open, folder_close)

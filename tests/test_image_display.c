@@ -142,13 +142,11 @@ TEST_WITH(test_regions_and_bands, folder_open, folder_close)
 {
     part_write("whole.ppm", 0, 0, 32, 32);
     part_write("part.ppm", 5, 11, 20, 9);
-    Text whole = file_text("whole.ppm"), part = file_text("part.ppm");
+    OwnedText whole = file_text("whole.ppm"), part = file_text("part.ppm");
     const size_t whole_start = strlen("P6\n32 32\n255\n"), part_start = strlen("P6\n20 9\n255\n");
     for (size_t y = 0; y < 9; y++)
         assert_memory_equal(part.items + part_start + 60 * y, whole.items + whole_start + 96 * (y + 11) + 15,
                             60);
-    text_free(&whole);
-    text_free(&part);
 }
 
 // Many rows at once, which threads share, have the same bytes as rows written one by one.

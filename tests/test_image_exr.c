@@ -124,7 +124,7 @@ static bool layer_read(Image *image, const char *layer, MessageList *messages)
 static void check_values(const char *layer, const char *expected, const char *what)
 {
     MessageList messages = {0};
-    Image image;
+    OwnedImage image;
     if (!layer_read(&image, layer, &messages)) fail_msg("%s: %s", what, messages.items[0].text);
     assert_int_equal(messages.count, 0);
     assert_int_equal(image.width, WIDTH);
@@ -139,7 +139,6 @@ static void check_values(const char *layer, const char *expected, const char *wh
             }
         }
     }
-    image_free(&image);
 }
 
 static void check_read(const char *names, const char *expected, Type type)
@@ -153,12 +152,11 @@ static void check_read(const char *names, const char *expected, Type type)
 
 static void check_refused(const char *layer, const char *reason)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Image image;
     assert_false(layer_read(&image, layer, &messages));
     assert_int_equal(messages.count, 1);
     if (!strstr(messages.items[0].text, reason)) fail_msg("%s, not: %s", messages.items[0].text, reason);
-    message_list_free(&messages);
 }
 
 TEST(test_compressions)
@@ -237,14 +235,13 @@ TEST(test_alpha_is_read)
     for (size_t i = 0; i < COUNT_OF(files); i++) {
         exr_write(files[i].names, plain);
         MessageList messages = {0};
-        Image image;
+        OwnedImage image;
         assert_true(layer_read(&image, files[i].layer, &messages));
         assert_int_equal(messages.count, 0);
         if (!image.alpha != (files[i].alpha == NONE)) fail_msg("%s", files[i].names);
         for (uint32_t k = 0; image.alpha && k < WIDTH * HEIGHT; k++)
             if (image.alpha[k] != value_at(k % WIDTH, k / WIDTH, files[i].alpha))
                 fail_msg("%s: pixel %u", files[i].names, k);
-        image_free(&image);
     }
 }
 
@@ -271,7 +268,7 @@ TEST(test_windows)
         must(exr_set_display_window(context, 0, &display));
         exr_close(context, 1, plain);
         MessageList messages = {0};
-        Image image;
+        OwnedImage image;
         assert_true(layer_read(&image, NULL, &messages));
         assert_int_equal(messages.count, 0);
         assert_int_equal(image.width, 20);
@@ -284,7 +281,6 @@ TEST(test_windows)
                 assert_true(image.values[y * 20 + x] == expected);
             }
         }
-        image_free(&image);
     }
 }
 
@@ -311,7 +307,7 @@ TEST(test_luminance_and_chroma)
     }
     must(exr_finish(&context));
     MessageList messages = {0};
-    Image image;
+    OwnedImage image;
     assert_true(layer_read(&image, NULL, &messages));
     assert_int_equal(messages.count, 0);
     assert_int_equal(image.channels, 3);
@@ -321,7 +317,6 @@ TEST(test_luminance_and_chroma)
         for (size_t channel = 0; channel < 3; channel++)
             assert_float_equal(image.values[3 * i + channel], expected[channel], 1e-6F);
     }
-    image_free(&image);
 }
 
 TEST(test_other_primaries_are_named)
@@ -333,15 +328,13 @@ TEST(test_other_primaries_are_named)
         exr_attr_chromaticities_t rec_709 = {0.64F, 0.33F, 0.3F, 0.6F, 0.15F, 0.06F, 0.3127F, 0.329F};
         must(exr_attr_set_chromaticities(context, 0, "chromaticities", is_wide ? &rec_2020 : &rec_709));
         exr_close(context, 1, plain);
-        MessageList messages = {0};
-        Image image;
+        OwnedMessageList messages = {0};
+        OwnedImage image;
         assert_true(layer_read(&image, NULL, &messages));
         assert_int_equal(messages.count, is_wide);
         if (is_wide)
             assert_string_equal(messages.items[0].text, "'a.exr': EXR: the chromaticities are ignored; the "
                                                         "colors are taken for Rec. 709's");
-        image_free(&image);
-        message_list_free(&messages);
     }
 }
 
@@ -363,10 +356,9 @@ TEST(test_blocks_as_large_as_compressed)
             assert_non_null(writer);
             assert_true(image_writer_rows(writer, values, 1, &messages));
             assert_true(image_writer_commit(writer, &messages));
-            Image image;
+            OwnedImage image;
             assert_true(image_read(&image, path, NULL, &messages));
             assert_memory_equal(image.values, values, width * sizeof *values);
-            image_free(&image);
         }
     }
 }
@@ -389,7 +381,7 @@ TEST(test_rows_in_any_number)
         for (size_t k = 0; k < ROWS * COLUMNS * 3; k++)
             values[i][k] = (float)(k * (k + i) % 1009);
     static const uint32_t steps[] = {ROWS, 1, 5, 15, 16, 17, 32, 100, 600};
-    Text whole = {0};
+    OwnedText whole = {0};
     for (size_t k = 0; k < COUNT_OF(steps); k++) {
         MessageList messages = {0};
         ImageWriter *writer = image_writer_open(path, &header, &messages);
@@ -408,12 +400,10 @@ TEST(test_rows_in_any_number)
         assert_memory_equal(text.items, whole.items, whole.count);
         if (k > 0) text_free(&text);
     }
-    text_free(&whole);
-    Image image;
+    OwnedImage image;
     MessageList messages = {0};
     assert_true(image_read(&image, path, NULL, &messages));
     assert_memory_equal(image.values, values[0], sizeof values[0]);
-    image_free(&image);
 }
 
 TEST(test_integer_channels_are_refused)

@@ -21,7 +21,7 @@ static char folder[] = "/tmp/glint-test-XXXXXX";
 // Writes a bumpy ball with texture coordinates, and normals if it is smooth.
 static void ball_write(const char *name, bool is_smooth)
 {
-    Text text = {0};
+    OwnedText text = {0};
     for (int i = 0; i <= SIDE; i++)
         for (int k = 0; k <= SIDE; k++) {
             const double across = M_PI * (0.02 + 0.96 * i / SIDE), around = 2 * M_PI * k / SIDE;
@@ -45,7 +45,6 @@ static void ball_write(const char *name, bool is_smooth)
     char path[256];
     snprintf(path, sizeof path, "%s/%s", folder, name);
     file_write(path, text_c(&text));
-    text_free(&text);
 }
 
 static int instances_open(void **state)
@@ -70,7 +69,7 @@ static int instances_close(void **state)
 // Returns a scene of balls in a group scaled by `size` and moved to `place`, with the camera and the lights.
 static Scene scene_with(double size, Vector3 place, const char *objects)
 {
-    Text text = {0};
+    OwnedText text = {0};
     const Vector3 points[] = {{0.5, 2.2, -7}, {0, 0.2, 0}, {4, 7, -5}};
     Vector3 at[3];
     for (int i = 0; i < 3; i++)
@@ -102,7 +101,6 @@ static Scene scene_with(double size, Vector3 place, const char *objects)
         "      objects:\n        - plane: {point: [0, -1.2, 0], normal: [0, 1, 0]}\n%s\n",
         size, place.x, place.y, place.z, objects);
     Scene scene = scene_of_text("a.yaml", text_c(&text));
-    text_free(&text);
     return scene;
 }
 
@@ -213,35 +211,29 @@ TEST(shared_meshes_look_as_copies)
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!is_tested(precision)) continue;
         for (size_t i = 0; i < COUNT_OF(cases); i++) {
-            Scene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
+            OwnedScene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
             RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
-            Film copied = render(&scene, &settings, INSTANCES_COPIED);
-            Film shared = render(&scene, &settings, INSTANCES_SHARED);
+            OwnedFilm copied = render(&scene, &settings, INSTANCES_COPIED);
+            OwnedFilm shared = render(&scene, &settings, INSTANCES_SHARED);
             assert_int_equal(film_count_faulty(&shared), 0);
             const Difference d = difference_of(&shared, &copied);
             difference_check(&d, precision, cases[i].place, cases[i].name);
-            film_free(&copied);
-            film_free(&shared);
-            scene_free(&scene);
         }
     }
 }
 
 static void check_lanes(Precision precision, size_t i)
 {
-    Scene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
+    OwnedScene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
     settings.lanes = 1;
-    Film expected = render(&scene, &settings, INSTANCES_SHARED);
+    OwnedFilm expected = render(&scene, &settings, INSTANCES_SHARED);
     for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         if (*lanes == 1) continue;
         settings.lanes = *lanes;
-        Film film = render(&scene, &settings, INSTANCES_SHARED);
+        OwnedFilm film = render(&scene, &settings, INSTANCES_SHARED);
         film_assert_same(&film, &expected, cases[i].name);
-        film_free(&film);
     }
-    film_free(&expected);
-    scene_free(&scene);
 }
 
 TEST(lanes_agree)
@@ -256,7 +248,7 @@ TEST(lanes_agree)
 // Returns a scene of many instances, some of which overlap.
 static Scene many_make(size_t count)
 {
-    Text text = {0};
+    OwnedText text = {0};
     Random random = {7};
     for (size_t i = 0; i < count; i++) {
         const Vector3 turn = vector_scale(random_cube_point(&random, 1), 180),
@@ -268,22 +260,20 @@ static Scene many_make(size_t count)
                      0.1 + fabs(scale.z), turn.x, turn.y, turn.z, place.x, 0.5 * place.y, place.z);
     }
     Scene scene = scene_with(1, (Vector3){0, 0, 0}, text_c(&text));
-    text_free(&text);
     return scene;
 }
 
 TEST(many_instances_look_as_copies)
 {
-    Scene scene = many_make(80);
+    OwnedScene scene = many_make(80);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_DOUBLE; precision++) {
         if (!is_tested(precision)) continue;
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         settings.lanes = 1;
-        Film copied = render(&scene, &settings, INSTANCES_COPIED);
-        Film expected = render(&scene, &settings, INSTANCES_SHARED);
+        OwnedFilm copied = render(&scene, &settings, INSTANCES_COPIED);
+        OwnedFilm expected = render(&scene, &settings, INSTANCES_SHARED);
         const Difference d = difference_of(&expected, &copied);
         difference_check(&d, precision, (Vector3){0, 0, 0}, "many");
-        film_free(&copied);
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             if (*lanes == 1) continue;
             settings.lanes = *lanes;
@@ -296,29 +286,24 @@ TEST(many_instances_look_as_copies)
             film_free(&film);
             settings.bvh = BVH_AUTO;
         }
-        film_free(&expected);
     }
-    scene_free(&scene);
 }
 
 TEST(the_feature_alone_and_all_together_agree)
 {
-    Scene scene = many_make(30);
+    OwnedScene scene = many_make(30);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.instances = INSTANCES_SHARED;
     settings.extra_features = 0;
-    Film alone = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm alone = film_render(&probe_compute, &scene, &settings, 0);
     settings.extra_features = FEATURE_ALL;
-    Film all = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm all = film_render(&probe_compute, &scene, &settings, 0);
     film_assert_same(&alone, &all, "features");
-    film_free(&alone);
-    film_free(&all);
-    scene_free(&scene);
 }
 
 TEST(renderers_share_a_compiled_scene)
 {
-    Scene scene = many_make(3);
+    OwnedScene scene = many_make(3);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.instances = INSTANCES_SHARED;
     Renderer *renderers[2] = {NULL};
@@ -327,13 +312,12 @@ TEST(renderers_share_a_compiled_scene)
     assert_true(renderers_open(&set, &scene, &settings, NULL, &messages[2]));
     for (size_t i = 0; i < 2; i++)
         renderer_close(renderers[i]);
-    scene_free(&scene);
 }
 
 TEST(a_moved_camera_sees_what_a_new_one_sees)
 {
     for (int few = 0; few < 2; few++) {
-        Scene scene = many_make(few ? 3 : 30);
+        OwnedScene scene = many_make(few ? 3 : 30);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
         settings.instances = INSTANCES_SHARED;
         settings.moves = true;
@@ -344,15 +328,12 @@ TEST(a_moved_camera_sees_what_a_new_one_sees)
         for (size_t i = 0; i < 3; i++) {
             scene.camera.position = places[i];
             assert_true(renderer_move(renderer, &scene, &settings, &messages));
-            Film moved, fresh = film_render(&probe_compute, &scene, &settings, AOV_OBJECT);
+            OwnedFilm moved, fresh = film_render(&probe_compute, &scene, &settings, AOV_OBJECT);
             assert_true(renderer_render_film(renderer, AOV_OBJECT, &moved));
             film_assert_same(&moved, &fresh, "moved");
-            film_free(&moved);
-            film_free(&fresh);
         }
         renderer_close(renderer);
         assert_int_equal(messages.count, 0);
-        scene_free(&scene);
     }
 }
 
@@ -365,9 +346,8 @@ static const CompileSettings plain_settings = {.width = 1,
 
 static size_t instance_count(const Scene *scene, const CompileSettings *settings)
 {
-    CompiledScene compiled = scene_compiled(scene, settings);
+    OwnedCompiledScene compiled = scene_compiled(scene, settings);
     const size_t count = compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count;
-    compiled_scene_free(&compiled);
     return count;
 }
 
@@ -388,25 +368,23 @@ TEST(meshes_are_shared_where_copies_are_large)
 TEST(an_uneven_transform_makes_a_copy)
 {
     // across a diagonal, and along the mesh's axes, where no digit is lost
-    Scene scene =
+    OwnedScene scene =
         scene_with(1, (Vector3){0, 0, 0},
                    INSTANCE("flat", "[{rotate: [0, 0, 45]}, {scale: [1, 0.01, 1]}]")
                        INSTANCE("flat", "{scale: [1, 0.01, 1]}") INSTANCE("flat", "{rotate: [0, 0, 45]}")
                            INSTANCE("smooth", "[{rotate: [0, 0, 45]}, {scale: [1, 0.01, 1]}]"));
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
-    CompiledScene compiled = scene_compiled(&scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count, 2);
     assert_int_equal(compiled.arrays[FLAT_SHARED_MESHES].count, 1);
     assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count, 3 * TRIANGLES);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // A material with an image makes separate texture coordinates, other materials do not.
 TEST(materials_share_geometry)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_with(1, (Vector3){0, 0, 0},
                    INSTANCE("flat", "{scale: 1}")
                        INSTANCE("flat", "{scale: 2}") "        - instance: {of: smooth, material: matte}\n"
@@ -414,22 +392,18 @@ TEST(materials_share_geometry)
                                                       "        - instance: {of: smooth, material: globe}\n");
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
-    CompiledScene compiled = scene_compiled(&scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.arrays[FLAT_SHARED_MESHES].count, 3);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 static void check_message(const Scene *scene, const CompileSettings *settings, const char *expected)
 {
     CompiledScene compiled;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     assert_false(scene_compile(&compiled, scene, settings, &messages));
-    Text text = {0};
+    OwnedText text = {0};
     message_describe(&text, &messages.items[0]);
     assert_string_equal(text_c(&text), expected);
-    text_free(&text);
-    message_list_free(&messages);
 }
 
 // Repeats the scene's last object, which costs no memory but its own.
@@ -443,7 +417,7 @@ static void object_repeat(Scene *scene, size_t count)
 
 TEST(too_many_are_refused)
 {
-    Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
+    OwnedScene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
     object_repeat(&scene, (1 << 24) / TRIANGLES);
     CompileSettings settings = plain_settings;
     settings.certifies = true;
@@ -455,13 +429,12 @@ TEST(too_many_are_refused)
     settings.certifies = false;
     check_message(&scene, &settings,
                   "error: the scene has 2147484673 objects and triangles with IDs, more than 2147483646\n");
-    scene_free(&scene);
 }
 
 // 10,000 instances of 20,000 triangles need the arrays of one mesh and of the instances.
 TEST(instances_take_little_memory)
 {
-    Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
+    OwnedScene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
     const Mesh small = scene.meshes.items[scene.objects.items[1].as.mesh.index];
     Mesh *mesh = &scene.meshes.items[scene.objects.items[1].as.mesh.index];
     enum { TIMES = 20000 / TRIANGLES + 1 };
@@ -474,7 +447,7 @@ TEST(instances_take_little_memory)
     for (uint32_t lanes = 1; lanes <= 16; lanes *= 16) {
         CompileSettings settings = plain_settings;
         settings.lanes = lanes;
-        CompiledScene compiled = scene_compiled(&scene, &settings);
+        OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
         size_t device = 0, host = 0;
         for (size_t type = 0; type < FLAT_COUNT; type++) {
             device += flat_array_size(&compiled.arrays[type], false);
@@ -482,9 +455,7 @@ TEST(instances_take_little_memory)
         }
         assert_true(device > 0 && device <= 10 << 20);
         assert_true(host > 0 && host <= 16 << 20);
-        compiled_scene_free(&compiled);
     }
-    scene_free(&scene);
 }
 
 TEST_MAIN(instances_open, instances_close)

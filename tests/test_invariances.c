@@ -106,7 +106,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
 {
     static const int exponents[] = {-90, -60, -10, 3, 10, 60, 90};
     for (size_t i = 0; i < COUNT_OF(exponents); i++) {
-        Scene scene = optical_scene(seed);
+        OwnedScene scene = optical_scene(seed);
         scene_scale(&scene, ldexp(1, exponents[i]));
         Film film = render(&scene, &c->settings);
         for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++) {
@@ -117,7 +117,6 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
         char what[32];
         snprintf(what, sizeof what, "scaled by 2^%d", exponents[i]);
         same_and_freed(c, &film, what);
-        scene_free(&scene);
     }
 }
 
@@ -148,7 +147,7 @@ static Scene unchecked_scene(uint64_t seed)
 
 static void mirror_flips_the_image(const Case *checkered, uint64_t seed)
 {
-    Scene given = unchecked_scene(seed), scene = unchecked_scene(seed);
+    OwnedScene given = unchecked_scene(seed), scene = unchecked_scene(seed);
     scene_mirror(&scene);
     Case c = *checkered;
     c.film = render(&given, &c.settings);
@@ -164,8 +163,6 @@ static void mirror_flips_the_image(const Case *checkered, uint64_t seed)
     columns_flip(film.shadow, film.light_count * sizeof *film.shadow);
     same_and_freed(&c, &film, "mirrored");
     film_free(&c.film);
-    scene_free(&scene);
-    scene_free(&given);
 }
 
 // Maps object ids, which are list indices, back to the original order.
@@ -173,7 +170,7 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
 {
     Random random = {seed};
     for (int permutation = 0; permutation < 2; permutation++) {
-        Scene given = optical_scene(seed), scene = optical_scene(seed);
+        OwnedScene given = optical_scene(seed), scene = optical_scene(seed);
         uint32_t from[OBJECTS];
         for (uint32_t i = 0; i < OBJECTS; i++)
             from[i] = OBJECTS - 1 - i;
@@ -188,8 +185,6 @@ static void order_changes_ids_alone(const Case *c, uint64_t seed)
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++)
             if (film.object[i] != UINT32_MAX) film.object[i] = from[film.object[i]];
         same_and_freed(c, &film, permutation == 0 ? "objects in reverse" : "objects shuffled");
-        scene_free(&scene);
-        scene_free(&given);
     }
 }
 
@@ -198,7 +193,7 @@ static void precision_holds(void **state)
     const Precision precision = *(const Precision *)*state;
     if (!probe_has(precision) || precision < probe_same_bits_from()) skip();
     for (uint64_t seed = 1; seed <= (tests_are_long() ? SEEDS : 2); seed++) {
-        Scene scene = optical_scene(seed);
+        OwnedScene scene = optical_scene(seed);
         char name[48];
         snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
         Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
@@ -221,7 +216,6 @@ static void precision_holds(void **state)
         mirror_flips_the_image(&c, seed);
         order_changes_ids_alone(&c, seed);
         film_free(&c.film);
-        scene_free(&scene);
     }
 }
 
@@ -234,7 +228,7 @@ TEST_CASE(double_holds, precision_holds, &(Precision){PRECISION_DOUBLE})
 TEST(culls_of_several_packets_change_nothing)
 {
     static const size_t counts[] = {3, 9, 31, 32, 33, 34, OBJECTS};
-    Scene scene = random_scene(1, 2 * OBJECTS);
+    OwnedScene scene = random_scene(1, 2 * OBJECTS);
     for (size_t i = 0; i < OBJECTS; i++) // all bounded
         scene.objects.items[i] = scene.objects.items[2 * OBJECTS - 1 - i];
     scene.objects.count = OBJECTS;
@@ -261,7 +255,6 @@ TEST(culls_of_several_packets_change_nothing)
         }
         film_free(&c.film);
     }
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -74,12 +74,12 @@ static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 // Float holds all numbers exactly, so that the answer is exact at every precision.
 TEST_AT_EACH_PRECISION(background_and_ambient)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
                  "background: [0.125, 0.25, 2]\nambient: [0.5, 0.25, 1]\n"
                  "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: [0.5, 1, 0.25], "
                  "ambient: 0.75}}}]\n");
-    Film film = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
+    OwnedFilm film = render(&scene, 31, 31, precision, AOV_OBJECT | AOV_T);
     size_t seen = 0;
     for (size_t i = 0; i < (size_t)31 * 31; i++) {
         const double *color = film.color + 3 * i;
@@ -95,20 +95,18 @@ TEST_AT_EACH_PRECISION(background_and_ambient)
     // the sphere's outline has the half-angle asin(1/4): a circle of radius 15.5 tan(asin(1/4)) pixels
     double radius = 15.5 * 0.25 / sqrt(15.0 / 16);
     check(near((double)seen, M_PI * radius * radius, 4));
-    film_free(&film);
-    scene_free(&scene);
 }
 
 // A light straight above a plane, seen from above, gives kd C I N.L, and with ks the whole highlight in the
 // middle.
 TEST_AT_EACH_PRECISION(light_above_plane)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
                  "lights: [{point: {position: [0, 4, 0], color: [1, 0.5, 0.25], intensity: 0.5}}]\n"
                  "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
                  "diffuse: [0.5, 0.25, 1]}}}]\n");
-    Film film = render(&scene, 33, 33, precision, AOV_POSITION);
+    OwnedFilm film = render(&scene, 33, 33, precision, AOV_POSITION);
     double tolerance = precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
     for (size_t i = 0; i < (size_t)33 * 33; i++) {
         Vector3 p = film_place(&film, &scene, i);
@@ -122,24 +120,21 @@ TEST_AT_EACH_PRECISION(light_above_plane)
     }
     size_t middle = 16 * 33 + 16;
     check(film.color[3 * middle] == 0.125);
-    film_free(&film);
 
     scene.materials.items[scene.objects.items[0].material].specular.largest = 0.75;
-    Film shiny = render(&scene, 33, 33, precision, 0);
+    OwnedFilm shiny = render(&scene, 33, 33, precision, 0);
     check(near(shiny.color[3 * middle], 0.125 + 0.5 * 0.75, tolerance));
     check(near(shiny.color[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));
-    film_free(&shiny);
-    scene_free(&scene);
 }
 
 // R1: a sphere on a plane under a light has a shadow with the radius 10 / sqrt(80) that reaches the contact.
 TEST_AT_EACH_PRECISION(contact_shadow)
 {
-    Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
-                           "lights: [{point: {position: [0, 10, 0]}}]\n"
-                           "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-                           "  - sphere: {center: [0, 1, 0], radius: 1}\n");
-    Film film = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
+    OwnedScene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
+                                "lights: [{point: {position: [0, 10, 0]}}]\n"
+                                "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                                "  - sphere: {center: [0, 1, 0], radius: 1}\n");
+    OwnedFilm film = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
     const double edge = 10 / sqrt(80.0);
     size_t dark = 0, bright = 0;
     for (size_t i = 0; i < (size_t)480 * 360; i++) {
@@ -159,23 +154,21 @@ TEST_AT_EACH_PRECISION(contact_shadow)
         *(lit ? &bright : &dark) += 1;
     }
     check(dark > 1000 && bright > 10000);
-    film_free(&film);
-    scene_free(&scene);
 }
 
 // A spot shines straight down on a plane from height 5. The cone of 30 degrees intersects it in a circle of
 // radius 5 tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
 TEST_AT_EACH_PRECISION(spot_cone)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
                  "lights: [{spot: {position: [0, 5, 0], look_at: [0, 0, 0], angle: 30, penumbra: 10}}]\n"
                  "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]\n");
     const double outer = 5 * tan(M_PI / 6), inner = 5 * tan(M_PI / 9);
     const double versine_outer = 1 - cos(M_PI / 6), versine_inner = 1 - cos(M_PI / 9);
-    Film soft = render(&scene, 160, 160, precision, AOV_POSITION);
+    OwnedFilm soft = render(&scene, 160, 160, precision, AOV_POSITION);
     scene.lights.items[0].spot.penumbra = 0;
-    Film hard = render(&scene, 160, 160, precision, AOV_POSITION);
+    OwnedFilm hard = render(&scene, 160, 160, precision, AOV_POSITION);
     size_t between = 0;
     for (size_t i = 0; i < (size_t)160 * 160; i++) {
         Vector3 p = film_place(&soft, &scene, i);
@@ -189,9 +182,6 @@ TEST_AT_EACH_PRECISION(spot_cone)
         between += strength > 0 && strength < 1;
     }
     check(between > 1000);
-    film_free(&soft);
-    film_free(&hard);
-    scene_free(&scene);
 }
 
 // Returns Phong's term at the surface that the film shows behind a pixel.
@@ -225,7 +215,7 @@ static long double highlight_of(const Film *film, const Scene *scene, size_t pix
 TEST_AT_EACH_PRECISION(highlight)
 {
     static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
-    Scene scene = scene_of(
+    OwnedScene scene = scene_of(
         "camera: {position: [0.5, 0.25, 4], look_at: [0, 0, 1], fov: 32}\n"
         "lights: [{point: {position: [-0.25, 0.5, 4]}}]\n"
         "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
@@ -240,7 +230,7 @@ TEST_AT_EACH_PRECISION(highlight)
                            : precision == PRECISION_STRICT                        ? 1e-4
                            : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3
                                                                                   : 2;
-        Film film = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
+        OwnedFilm film = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
         double brightest = 0;
         for (size_t i = 0; i < (size_t)201 * 201; i++) {
             double value = film.color[3 * i];
@@ -252,9 +242,7 @@ TEST_AT_EACH_PRECISION(highlight)
             if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
         }
         check(brightest > 1 - 1e-3);
-        film_free(&film);
     }
-    scene_free(&scene);
 }
 
 // P2: no pixel of a tilted plane of size S, at distance O from the world's origin under a low sun, shadows
@@ -265,7 +253,7 @@ TEST_AT_EACH_PRECISION(tilted_plane)
     static const double elevations[] = {0.01, 1, 45};
     const Vector3 n = vector_normalize((Vector3){1, 2, 3});
     const Vector3 e = vector_normalize(vector_cross(n, (Vector3){1, 0, 0}));
-    Scene scene =
+    OwnedScene scene =
         scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
                  "lights: [{directional: {direction: [0, 0, 1]}}]\n"
                  "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
@@ -282,7 +270,7 @@ TEST_AT_EACH_PRECISION(tilted_plane)
             double angle = elevations[k] * M_PI / 180;
             scene.lights.items[0].direction =
                 vector_add(vector_scale(n, -sin(angle)), vector_scale(e, -cos(angle)));
-            Film film = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
+            OwnedFilm film = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
             for (size_t pixel = 0; pixel < (size_t)128 * 128; pixel++) {
                 check(film.object[pixel] == 0);
                 check(film.shadow[pixel] == 0);
@@ -290,10 +278,8 @@ TEST_AT_EACH_PRECISION(tilted_plane)
             }
             check(film.color[0] > 0);
             check(near(film.color[0], 0.75 * sin(angle), precision == PRECISION_DOUBLE ? 1e-15 : 2e-7));
-            film_free(&film);
         }
     }
-    scene_free(&scene);
 }
 
 // The eye and a light are inside a closed shape, all of which is seen and lit.
@@ -309,18 +295,16 @@ TEST_AT_EACH_PRECISION(inside)
     };
     for (size_t i = 0; i < COUNT_OF(shapes); i++) {
         snprintf(place, sizeof place, "%s, inside %s", precision_names[precision], shapes[i]);
-        Scene scene =
+        OwnedScene scene =
             scene_of(formatted("camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
                                "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
                                shapes[i]));
-        Film film = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
+        OwnedFilm film = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
         for (size_t pixel = 0; pixel < (size_t)96 * 96; pixel++) {
             check(film.object[pixel] == 0);
             check(film.shadow[pixel] == 0);
             check(film.color[3 * pixel] > 0);
         }
-        film_free(&film);
-        scene_free(&scene);
     }
 }
 
@@ -350,8 +334,8 @@ TEST_AT_EACH_PRECISION(ground_horizon)
     };
     const uint32_t side = 256;
     for (size_t k = 0; k < COUNT_OF(grounds); k++) {
-        Scene scene = scene_of(grounds[k].view);
-        Film film = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
+        OwnedScene scene = scene_of(grounds[k].view);
+        OwnedFilm film = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
         for (uint32_t column = 0; column < side; column++) {
             uint32_t horizon = 0, exact = 0;
             while (horizon < side && film.object[horizon * side + column] == UINT32_MAX)
@@ -362,8 +346,6 @@ TEST_AT_EACH_PRECISION(ground_horizon)
             for (uint32_t row = horizon; row < side; row++)
                 check(film.object[row * side + column] == 0);
         }
-        film_free(&film);
-        scene_free(&scene);
     }
 }
 
@@ -393,7 +375,7 @@ static uint64_t panes_render(bool transparent, Precision precision, uint32_t lan
 {
     char text[1024];
     snprintf(text, sizeof text, PANES, transparent ? ", transmission: 1, ior: 1.5" : "");
-    Scene scene = scene_of(text);
+    OwnedScene scene = scene_of(text);
     RenderSettings settings = film_settings(5, 3, precision);
     settings.extra_features = 0;
     settings.lanes = lanes;
@@ -401,15 +383,13 @@ static uint64_t panes_render(bool transparent, Precision precision, uint32_t lan
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
     check(renderer);
-    Film film;
+    OwnedFilm film;
     check(renderer_render_film(renderer, 0, &film));
     const double expected = (transparent ? 2 * bounces + 1 : bounces + 1) / 512.0;
     for (size_t i = 0; i < 3 * film_pixel_count(&film); i++)
         check(near(film.color[i], expected, 0));
     uint64_t hash = renderer_report(renderer)->kernel_hash;
-    film_free(&film);
     renderer_close(renderer);
-    scene_free(&scene);
     return hash;
 }
 
@@ -449,10 +429,10 @@ TEST(degenerate_cameras)
         {"huge up", {0, 0, 3}, {0, 1e300, 0}},
         {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
     };
-    Film unrolled = {0};
+    OwnedFilm unrolled = {0};
     for (size_t i = 0; i < COUNT_OF(cameras); i++) {
         snprintf(place, sizeof place, "%s", cameras[i].name);
-        Scene scene =
+        OwnedScene scene =
             scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
                      "objects: [{box: {min: [-4, -4, -4], max: [4, 4, 4], material: {checker: {colors: "
                      "[[1, 1, 1], [0.5, 0, 0]], size: 1.1}}}}]\n");
@@ -468,30 +448,26 @@ TEST(degenerate_cameras)
         else if (i <= 2)
             film_assert_same(&film, &unrolled, place);
         if (i > 0) film_free(&film);
-        scene_free(&scene);
     }
-    film_free(&unrolled);
 }
 
 // R8: a single pixel looks along the view, and extreme fields of view stay finite.
 TEST(single_pixel_and_extreme_fields)
 {
-    Scene scene = scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
-                           "ambient: [1, 1, 1]\nobjects: [{sphere: {center: [0, 0, 0], radius: 0.001}}]\n");
+    OwnedScene scene =
+        scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
+                 "ambient: [1, 1, 1]\nobjects: [{sphere: {center: [0, 0, 0], radius: 0.001}}]\n");
     static const double fields[] = {1e-3, 50, 179.9};
     for (size_t i = 0; i < 3; i++) {
         snprintf(place, sizeof place, "fov %g", fields[i]);
         scene.camera.half_tangent = tan(fields[i] * M_PI / 360);
-        Film film = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
+        OwnedFilm film = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
         check(film.object[0] == 0 && film.color[0] == 1);
         check(near(film.t[0], sqrt(54) - 0.001, 1e-5));
-        film_free(&film);
-        Film wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
+        OwnedFilm wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
         check(wide.object[16 * 51 + 25] == 0);
         check((wide.object[0] == 0) == (fields[i] == 1e-3));
-        film_free(&wide);
     }
-    scene_free(&scene);
 }
 
 // The eye is the origin, so that the same scene 2^23 away has the same bits.
@@ -501,7 +477,7 @@ TEST(distance_from_origin_changes_nothing)
     for (size_t i = 0; i < 2; i++) {
         double far = i == 0 ? 0 : 0x1p23;
         snprintf(place, sizeof place, "moved by %g", far);
-        Scene scene = scene_of(
+        OwnedScene scene = scene_of(
             formatted("camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
                       "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
                       "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
@@ -509,7 +485,6 @@ TEST(distance_from_origin_changes_nothing)
                       "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
                       far + 0.25, far + 0.25, far + 2, far + 0.5, far));
         films[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
-        scene_free(&scene);
     }
     film_assert_same(&films[1], &films[0], "2^23 from the origin");
     film_free(&films[0]);
@@ -524,15 +499,13 @@ TEST_AT_EACH_PRECISION(plates_far_away)
                                   ("cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
                                    "radius: 1e6}")};
     for (size_t i = 0; i < COUNT_OF(shapes); i++) {
-        Scene scene = scene_of(formatted(
+        OwnedScene scene = scene_of(formatted(
             "camera: {position: [0, 0, 0], look_at: [0, %d, -1], fov: 10}\nbackground: [0.25, 0.25, "
             "0.25]\nambient: [1, 1, 1]\nobjects:\n  - %s\n",
             i == 2 ? -1 : 0, shapes[i]));
-        Film film = render(&scene, 15, 15, precision, AOV_OBJECT);
+        OwnedFilm film = render(&scene, 15, 15, precision, AOV_OBJECT);
         check(film.object[7 * 15 + 7] == 0);
         check(film.object[0] == UINT32_MAX && film.object[14 * 15 + 7] == UINT32_MAX);
-        film_free(&film);
-        scene_free(&scene);
     }
 }
 
@@ -542,13 +515,12 @@ static const Vector3 skew_axis = {2 / 7.0, -3 / 7.0, 6 / 7.0}, skew_across = {6 
 // Returns a film of an object that lies in the direction of -skew_across and fills the view.
 static Film render_next_to_eye(const char *object, Precision precision)
 {
-    Scene scene = scene_of(formatted(
+    OwnedScene scene = scene_of(formatted(
         "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 40}\nobjects:\n  - %s\n",
         -skew_across.x, -skew_across.y, -skew_across.z, object));
     Film film = render(&scene, 32, 24, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
     for (size_t i = 0; i < film_pixel_count(&film); i++)
         check(film.object[i] == 0);
-    scene_free(&scene);
     return film;
 }
 
@@ -567,10 +539,10 @@ TEST_AT_EACH_PRECISION(thin_torus_next_to_eye)
                  u = precision == PRECISION_DOUBLE ? 1e-9 : 0x1p-24;
     const Vector3 center = vector_scale(skew_across, -(major + minor + distance)),
                   along = vector_cross(skew_axis, skew_across);
-    char *object =
+    OWNED char *object =
         text_format("torus: {center: [%.17g, %.17g, %.17g], axis: [2, -3, 6], major: 1e6, minor: 0.1}",
                     center.x, center.y, center.z);
-    Film film = render_next_to_eye(object, precision);
+    OwnedFilm film = render_next_to_eye(object, precision);
     for (size_t i = 0; i < film_pixel_count(&film); i++) {
         const Vector3 hit = vector_at(film.position, i);
         const double s = vector_dot(hit, along), height = vector_dot(hit, skew_axis),
@@ -579,8 +551,6 @@ TEST_AT_EACH_PRECISION(thin_torus_next_to_eye)
         check_normal(&film, i, vector_add(vector_scale(skew_across, away), vector_scale(skew_axis, height)),
                      u);
     }
-    film_free(&film);
-    free(object);
 }
 
 // A paraboloid with the focal length f, seen from outside at the height h = 10^6 above its apex, where its
@@ -591,10 +561,10 @@ static void check_deep_paraboloid(double distance, Precision precision)
                  u = precision == PRECISION_DOUBLE ? 1e-10 : 0x1p-24;
     const Vector3 foot = vector_scale(skew_across, -(radius + distance)),
                   apex = vector_subtract(foot, vector_scale(skew_axis, height));
-    char *object = text_format(
+    OWNED char *object = text_format(
         "paraboloid: {apex: [%.17g, %.17g, %.17g], axis: [2, -3, 6], focal_length: 1e-6, height: 2e6}",
         apex.x, apex.y, apex.z);
-    Film film = render_next_to_eye(object, precision);
+    OwnedFilm film = render_next_to_eye(object, precision);
     for (size_t i = 0; i < film_pixel_count(&film); i++) {
         const Vector3 from_foot = vector_subtract(vector_at(film.position, i), foot);
         const double above = vector_dot(from_foot, skew_axis);
@@ -602,8 +572,6 @@ static void check_deep_paraboloid(double distance, Precision precision)
         check(near(vector_length(across), 2 * sqrt(focal_length * (height + above)), 16 * u * radius));
         check_normal(&film, i, vector_subtract(across, vector_scale(skew_axis, 2 * focal_length)), u);
     }
-    film_free(&film);
-    free(object);
 }
 
 TEST_AT_EACH_PRECISION(deep_paraboloid_next_to_eye)

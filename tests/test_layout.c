@@ -155,7 +155,7 @@ static const char instance_text[] = "camera: {position: [0, 0, -5], look_at: [0,
 
 static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, bool is_double, bool certifies)
 {
-    Scene scene = scene_of_text("layout.yaml", text);
+    OwnedScene scene = scene_of_text("layout.yaml", text);
     const CompileSettings settings = {.width = 1,
                                       .height = 1,
                                       .sample_count = 1,
@@ -165,11 +165,9 @@ static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, b
                                       .lanes = BVH_WIDTH_MIN, // with blocks of triangles
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};
-    CompiledScene compiled = scene_compiled(&scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
     for (size_t type = 0; type < FLAT_COUNT; type++)
         if (compiled.arrays[type].count > 0) layouts[type] = compiled.arrays[type].layout;
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // `certified` has the triangles' neighbors and copies instances.
@@ -205,11 +203,10 @@ static void kernels_write(Text *text)
 
 static cl_program program_make(bool is_double)
 {
-    Text text = {0};
+    OwnedText text = {0};
     kernels_write(&text);
     cl_program program = probe_program(text_c(&text), 1, is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
                                        true, 0, "-cl-std=CL1.2");
-    text_free(&text);
     return program;
 }
 
@@ -329,11 +326,10 @@ static void values_check(void **state)
     for (size_t type = 0; type < FLAT_COUNT; type++) {
         FlatArray array = array_fill(type, &layouts[type]);
         size_t size = flat_array_size(&array, is_double);
-        char *bytes = memory_allocate(size, 1);
+        OWNED char *bytes = memory_allocate(size, 1);
         flat_array_write(&array, is_double, bytes);
         for (size_t i = 0; i < MEMBER_COUNT; i++)
             if (members[i].type == type) member_check(program, i, bytes, size, is_double);
-        free(bytes);
         free(array.items);
     }
     clReleaseProgram(program);
@@ -379,17 +375,15 @@ static void threads_write_what_one_does(void **state)
         FlatArray array = {memory_allocate_large(COUNT, layout->size), COUNT, *layout};
         for (size_t i = 0; i < words; i++) // doubles that are floats, about 1
             ((uint32_t *)array.items)[i] = i % 2 ? 0x3ff00000u + (uint32_t)(i & 0xffff) : 0;
-        char *written = memory_allocate(flat_array_size(&array, is_double), 1);
+        OWNED char *written = memory_allocate(flat_array_size(&array, is_double), 1);
         flat_array_write(&array, is_double, written);
         for (size_t i = 0; i < COUNT; i += PART) {
             const FlatArray part = {flat_array_at(&array, i), PART, *layout};
             const size_t size = flat_array_size(&part, is_double);
-            char *bytes = memory_allocate(size, 1);
+            OWNED char *bytes = memory_allocate(size, 1);
             flat_array_write(&part, is_double, bytes);
             assert_memory_equal(bytes, written + i / PART * size, size);
-            free(bytes);
         }
-        free(written);
         free(array.items);
     }
 }

@@ -177,16 +177,14 @@ static void assert_same_with_the_bvh(const Scene *scene, Precision precision)
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         settings.lanes = *lanes;
         settings.bvh = BVH_OFF;
-        Film expected = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        OwnedFilm expected = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
         settings.bvh = BVH_ON;
-        Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        OwnedFilm film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
         film_assert_same(&film, &expected, precision_names[precision]);
         size_t seen, shadowed;
         count_seen(&expected, scene, &seen, &shadowed);
         assert_true(seen >= WIDTH * HEIGHT / 8 && seen <= WIDTH * HEIGHT * 7 / 8);
         assert_true(shadowed >= 16);
-        film_free(&film);
-        film_free(&expected);
     }
 }
 
@@ -203,9 +201,8 @@ TEST(no_pixel_depends_on_the_bvh)
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++)
         for (size_t i = 0; i < scene_count && is_tested(precision); i++) {
             random_state.state = i + 1;
-            Scene scene = scene_attacking(scales[i % 3]);
+            OwnedScene scene = scene_attacking(scales[i % 3]);
             assert_same_with_the_bvh(&scene, precision);
-            scene_free(&scene);
         }
 }
 
@@ -233,17 +230,16 @@ TEST(no_shadow_of_a_far_lamp_depends_on_the_bvh)
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!is_tested(precision)) continue;
         random_state.state = 1;
-        Scene scene = {.camera = {.look_at = {0, 0, -1},
-                                  .up = {0, 1, 0},
-                                  .field_axis = FIELD_HORIZONTAL,
-                                  .half_tangent = half_tangent}};
+        OwnedScene scene = {.camera = {.look_at = {0, 0, -1},
+                                       .up = {0, 1, 0},
+                                       .field_axis = FIELD_HORIZONTAL,
+                                       .half_tangent = half_tangent}};
         array_push(scene.materials, material_default());
         array_push(scene.lights,
                    ((Light){.type = LIGHT_POINT, .color = {1, 1, 1}, .position = {9e3, 3e3, 3.5e3}}));
         sheet_add(&scene, -1.5, false);
         sheet_add(&scene, -1.498, true);
         assert_same_with_the_bvh(&scene, precision);
-        scene_free(&scene);
     }
 }
 

@@ -41,7 +41,7 @@ static const char square[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 TEST(vertices_are_joined)
 {
     file_write("a.obj", square);
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
     assert_int_equal(scene.objects.count, 1);
     assert_int_equal(scene.meshes.count, 1);
     const Mesh *mesh = &scene.meshes.items[0];
@@ -53,7 +53,6 @@ TEST(vertices_are_joined)
     Bounds bounds = scene_bounds(&scene, &unbounded_count);
     assert_vector(bounds.min, 0, 0, 0);
     assert_vector(bounds.max, 1, 1, 0);
-    scene_free(&scene);
 }
 
 static Vector3 only_corner(const Scene *scene, int corner)
@@ -65,24 +64,22 @@ static Vector3 only_corner(const Scene *scene, int corner)
 TEST(transforms_scale_then_turn_then_move)
 {
     file_write("a.obj", "v 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
-    Scene scene =
+    OwnedScene scene =
         scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [2, 3, 4], rotate: [90, 0, 90], "
                          "translate: [10, 20, 30]}}\n");
     assert_vector(only_corner(&scene, 0), 10, 22, 30);
     assert_vector(only_corner(&scene, 1), 10, 20, 33);
     assert_vector(only_corner(&scene, 2), 14, 20, 30);
-    scene_free(&scene);
 }
 
 // The outer side is where the corners are seen counterclockwise. A mirror keeps it outside.
 TEST(mirrored_mesh_keeps_its_outer_side)
 {
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [-1, 1, 1]}}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [-1, 1, 1]}}\n");
     Vector3 a = only_corner(&scene, 0), b = only_corner(&scene, 1), c = only_corner(&scene, 2);
     Vector3 normal = vector_cross(vector_subtract(b, a), vector_subtract(c, a));
     assert_vector(normal, 0, 0, 1);
-    scene_free(&scene);
 }
 
 static const char octahedron[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
@@ -91,7 +88,8 @@ static const char octahedron[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\
 TEST(normals_come_from_the_triangles)
 {
     file_write("a.obj", octahedron);
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true, transform: {scale: [3, 3, -3]}}\n");
+    OwnedScene scene =
+        scene_of_objects("  - mesh: {file: a.obj, smooth: true, transform: {scale: [3, 3, -3]}}\n");
     const Mesh *mesh = &scene.meshes.items[0];
     assert_int_equal(mesh->vertex_count, 6);
     assert_non_null(mesh->normals);
@@ -99,7 +97,6 @@ TEST(normals_come_from_the_triangles)
         Vector3 outward = vector_scale(mesh->vertices[i], 1 / 3.0);
         assert_vector(mesh->normals[i], outward.x, outward.y, outward.z);
     }
-    scene_free(&scene);
 }
 
 // Four corners of one square, whose two triangles together weigh as much as each of the others' single
@@ -107,12 +104,11 @@ TEST(normals_come_from_the_triangles)
 TEST(normals_do_not_see_the_cut_of_a_polygon)
 {
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 4 3 2\nf 1 2 5\nf 1 5 4\n");
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true}\n");
     const Mesh *mesh = &scene.meshes.items[0];
     double third = -1 / sqrt(3);
     for (size_t i = 0; i < mesh->vertex_count; i++)
         if (vector_is_zero(mesh->vertices[i])) assert_vector(mesh->normals[i], third, third, third);
-    scene_free(&scene);
 }
 
 TEST(normals_of_the_file_are_taken)
@@ -186,7 +182,7 @@ TEST(every_format_is_read)
     file_write("a.stl", STL_OF("1"));
     file_write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
     file_write("a.gltf", gltf);
-    Scene scene =
+    OwnedScene scene =
         scene_of_objects("  - mesh: {file: a.ply}\n  - mesh: {file: a.stl}\n  - mesh: {file: a.off}\n"
                          "  - mesh: {file: a.gltf}\n");
     assert_int_equal(scene.meshes.count, 4);
@@ -202,15 +198,13 @@ TEST(every_format_is_read)
             assert_vector(c, 1, 4, 3);
         }
     }
-    scene_free(&scene);
 }
 
 TEST(faces_without_corners_are_left_out)
 {
     file_write("a.ply", PLY_OF_FACES("0", "4 0 1 3 2"));
-    Scene scene = scene_of_objects("  - mesh: {file: a.ply}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.ply}\n");
     assert_int_equal(scene.meshes.items[0].triangle_count, 2);
-    scene_free(&scene);
 }
 
 // Vertices and texture coordinates that no triangle has are neither refused nor in the mesh.
@@ -227,14 +221,13 @@ TEST(what_no_face_uses_does_not_count)
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
-        Scene scene = scene_of_objects(formatted("  - mesh: {file: %s}\n", cases[i].name));
+        OwnedScene scene = scene_of_objects(formatted("  - mesh: {file: %s}\n", cases[i].name));
         assert_int_equal(scene.meshes.items[0].triangle_count, 1);
         assert_int_equal(scene.meshes.items[0].vertex_count, 3);
         size_t unbounded_count;
         Bounds bounds = scene_bounds(&scene, &unbounded_count);
         assert_vector(bounds.min, 0, 0, 0);
         assert_vector(bounds.max, 1, 1, 0);
-        scene_free(&scene);
     }
 }
 
@@ -257,7 +250,7 @@ static double area_of(const Mesh *mesh)
 TEST(concave_polygon_is_cut_in_full)
 {
     enum { TEETH = 100 };
-    Text text = {0}, face = {0};
+    OwnedText text = {0}, face = {0};
     text_appendf(&text, "v 0 0 0\nv %d 0 0\n", TEETH);
     text_appendf(&face, "f 1 2");
     for (int tooth = TEETH - 1; tooth >= 0; tooth--) {
@@ -268,23 +261,20 @@ TEST(concave_polygon_is_cut_in_full)
     }
     text_appendf(&text, "%s\n", text_c(&face));
     file_write("a.obj", text_c(&text));
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
     assert_int_equal(scene.meshes.items[0].triangle_count, 4 * TEETH);
     assert_number(area_of(&scene.meshes.items[0]), 287.0);
-    scene_free(&scene);
-    text_free(&text);
-    text_free(&face);
 }
 
 TEST(polygons_that_cannot_be_filled_are_reported)
 {
     file_write("a.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 3 3 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4\nf 1 2 5 6\n");
-    Text got = scene_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n", false);
+    OwnedText got =
+        scene_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n", false);
     assert_string_equal(
         text_c(&got),
         "4:18: warning: a.obj: triangles without area, which are never hit: 2\n"
         "4:18: warning: a.obj: 1 polygon intersects itself or is far from planar; only parts are filled\n");
-    text_free(&got);
 }
 
 TEST(faults_name_file_and_vertex)
@@ -333,9 +323,9 @@ TEST(other_formats_are_read)
 {
     static const char *const endings[] = {"fbx", "dae", "3ds", "off"};
     for (size_t i = 0; i < COUNT_OF(endings); i++) {
-        Scene scene = scene_of_objects(formatted("  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]));
+        OwnedScene scene =
+            scene_of_objects(formatted("  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]));
         assert_int_equal(scene.meshes.items[0].triangle_count, 1);
-        scene_free(&scene);
     }
 }
 
@@ -384,7 +374,7 @@ static void smooth_gltf_write(const char *path)
 {
     static const float numbers[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0,     0, 1,
                                     1, 0, 0, 0, 1, 0, 0, 1, 1, 0.75F, 0, 0};
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, "%s",
                  "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}],\n"
                  "\"nodes\": [{\"mesh\": 0}], \"meshes\": [{\"primitives\": [{\"attributes\":\n"
@@ -399,7 +389,6 @@ static void smooth_gltf_write(const char *path)
     base64_append(&text, (const uint8_t *)numbers, sizeof numbers);
     text_appendf(&text, "\"}]}\n");
     file_write(path, text_c(&text));
-    text_free(&text);
 }
 
 TEST(every_format_has_normals_and_texture_coordinates)
@@ -408,7 +397,7 @@ TEST(every_format_has_normals_and_texture_coordinates)
     file_write("a.dae", smooth_dae);
     file_write("a.fbx", smooth_fbx);
     smooth_gltf_write("a.gltf");
-    Scene scene =
+    OwnedScene scene =
         scene_of_objects("  - mesh: {file: a.obj}\n  - mesh: {file: a.dae}\n  - mesh: {file: a.fbx}\n"
                          "  - mesh: {file: a.gltf}\n");
     for (size_t i = 0; i < scene.meshes.count; i++) {
@@ -426,7 +415,6 @@ TEST(every_format_has_normals_and_texture_coordinates)
             for (size_t axis = 0; axis < 2; axis++)
                 assert_number(mesh->uvs[corners[k]][axis], uvs[k][axis]);
     }
-    scene_free(&scene);
 }
 
 // Checks what the process that runs assimp may do (tests/assimp_process.c), with lower limits. The caller of
@@ -476,12 +464,12 @@ TEST(scene_file_faults_are_reported)
 TEST(ids_count_the_triangles)
 {
     file_write("a.obj", octahedron);
-    Scene scene = scene_of_objects("  - sphere: {center: [9, 0, 0], radius: 1}\n"
-                                   "  - mesh: {file: a.obj}\n"
-                                   "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
-                                   "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
+    OwnedScene scene = scene_of_objects("  - sphere: {center: [9, 0, 0], radius: 1}\n"
+                                        "  - mesh: {file: a.obj}\n"
+                                        "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
+                                        "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
     const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .bvh = BVH_OFF};
-    CompiledScene flat = scene_compiled(&scene, &settings);
+    OwnedCompiledScene flat = scene_compiled(&scene, &settings);
     assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
     const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
     for (uint32_t id = 0; id < 11; id++) {
@@ -490,8 +478,6 @@ TEST(ids_count_the_triangles)
         const FlatArray *array = &flat.arrays[FLAT_FIRST_SHAPE + entry.x];
         assert_int_equal(*flat_id(array, flat_array_at(array, entry.y)), id);
     }
-    compiled_scene_free(&flat);
-    scene_free(&scene);
 }
 
 enum { GRID = 64 };
@@ -529,14 +515,12 @@ TEST(triangles_without_area_are_never_hit)
         text_appendf(&text, "%s%s", square, degenerate);
         file_write("a.obj", text_c(&text));
         text_free(&text);
-        MessageList messages = {0};
-        Text source = {0};
+        OwnedMessageList messages = {0};
+        OwnedText source = {0};
         text_appendf(&source, CAMERA_AND_LIGHT "objects:\n%s", objects);
         assert_true(scene_read_text(&scene, "scene.yaml", &source, false, &messages));
-        text_free(&source);
         assert_int_equal(messages.count, 1);
         assert_non_null(strstr(messages.items[0].text, "a.obj: triangles without area"));
-        message_list_free(&messages);
         assert_true(probe_trace(&scene, precision, 0, rays, GRID * GRID, hits));
         scene_free(&scene);
 
@@ -554,13 +538,12 @@ TEST(triangles_without_area_are_never_hit)
 // Checks that a renderer is not opened, with this error as the only message.
 static void assert_refused(Compute *compute, const Scene *scene, const char *expected)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     const RenderSettings settings = {.width = 1, .height = 1, .sample_count = 1};
     assert_null(renderer_open(compute, scene, &settings, &messages));
     assert_int_equal(messages.count, 1);
     assert_int_equal(messages.items[0].severity, MESSAGE_ERROR);
     assert_non_null(strstr(messages.items[0].text, expected));
-    message_list_free(&messages);
 }
 
 TEST(too_many_triangles_are_refused)
@@ -575,10 +558,10 @@ TEST(too_many_triangles_are_refused)
 TEST(copies_are_limited)
 {
     file_write("a.obj", square);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     const Source source = {.file = "scene.yaml", .bytes = "", .length = 0};
     Report report = report_open(&source, &messages);
-    Scene scene = {.copied_triangle_count = (1 << 24) - 2};
+    OwnedScene scene = {.copied_triangle_count = (1 << 24) - 2};
     static const char *const paths[] = {"a.obj", "./a.obj", "a.obj"};
     for (size_t i = 0; i < 3; i++) {
         const MeshImport import = {.path = paths[i], .transform = affine_identity, .report = &report};
@@ -589,14 +572,12 @@ TEST(copies_are_limited)
     assert_non_null(strstr(messages.items[0].text, "a.obj: named so often that its copies and others have "
                                                    "16777218 triangles, more than 16777216"));
     report_close(&report);
-    message_list_free(&messages);
-    scene_free(&scene);
 }
 
 TEST(device_without_room_is_reported)
 {
     file_write("a.obj", octahedron);
-    Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
+    OwnedScene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
     Device small = *probe_compute.device;
     Compute compute = probe_compute;
     compute.device = &small;
@@ -605,7 +586,6 @@ TEST(device_without_room_is_reported)
     small = *probe_compute.device;
     small.memory_bytes = 64;
     assert_refused(&compute, &scene, "has 64 bytes, and");
-    scene_free(&scene);
 }
 
 TEST_MAIN(meshes_open, meshes_close)

@@ -27,18 +27,17 @@ static Image gray_image(unsigned step)
 
 TEST(test_equal_images)
 {
-    Image image = gray_image(128);
+    OwnedImage image = gray_image(128);
     ImageMetrics metrics = image_metrics(&image, &image);
     assert_int_equal(metrics.differing_count, 0);
     assert_int_equal(metrics.off_by_1 + metrics.off_by_more, 0);
     assert_true(isinf(metrics.linear.psnr) && isinf(metrics.srgb_psnr));
     assert_true(metrics.flip_mean == 0 && metrics.flip_max == 0 && metrics.linear.largest == 0);
-    image_free(&image);
 }
 
 TEST(test_one_black_pixel)
 {
-    Image plain = gray_image(128), spot = gray_image(128);
+    OwnedImage plain = gray_image(128), spot = gray_image(128);
     for (size_t channel = 0; channel < 3; channel++)
         spot.values[(20 * SIDE + 40) * 3 + channel] = 0;
     ImageMetrics metrics = image_metrics(&plain, &spot);
@@ -56,37 +55,31 @@ TEST(test_one_black_pixel)
     assert_near(metrics.srgb_psnr, 10 * log10(pixels * 255 * 255 / (128 * 128)), 1e-9);
     assert_near(metrics.flip_mean, 0.00041315, 1e-7);
     assert_near(metrics.flip_max, 0.171734, 2e-6);
-    image_free(&plain);
-    image_free(&spot);
 }
 
 TEST(test_one_step_lighter)
 {
-    Image plain = gray_image(128), lighter = gray_image(129);
+    OwnedImage plain = gray_image(128), lighter = gray_image(129);
     ImageMetrics metrics = image_metrics(&plain, &lighter);
     assert_int_equal(metrics.off_by_1, SIDE * SIDE * 3);
     assert_int_equal(metrics.off_by_more, 0);
     assert_near(metrics.srgb_psnr, 48.1308, 1e-4);
     assert_near(metrics.flip_mean, 0.0298688, 1e-5);
     assert_near(metrics.flip_max, 0.0298688, 1e-5);
-    image_free(&plain);
-    image_free(&lighter);
 }
 
 TEST(test_black_and_white)
 {
-    Image black = gray_image(0), white = gray_image(255);
+    OwnedImage black = gray_image(0), white = gray_image(255);
     ImageMetrics metrics = image_metrics(&black, &white);
     assert_near(metrics.linear.psnr, 0, 1e-9);
     assert_near(metrics.linear.rel_mse, 100, 1e-9);
     assert_near(metrics.flip_mean, 0.967392, 1e-5);
-    image_free(&black);
-    image_free(&white);
 }
 
 TEST(test_what_is_not_finite)
 {
-    Image plain = gray_image(128), broken = gray_image(128);
+    OwnedImage plain = gray_image(128), broken = gray_image(128);
     plain.display = broken.display = false;
     broken.values[(2 * SIDE + 7) * 3 + 1] = NAN;
     plain.values[30] = broken.values[30] = INFINITY;
@@ -99,8 +92,6 @@ TEST(test_what_is_not_finite)
     assert_int_equal(metrics.worst_x, 7);
     assert_int_equal(metrics.worst_y, 2);
     assert_true(metrics.flip_max > 0 && metrics.flip_max <= 1); // the missing number shows as none
-    image_free(&plain);
-    image_free(&broken);
 }
 
 TEST(test_zeros_of_two_signs_differ)
@@ -153,7 +144,7 @@ TEST(test_kinds_that_do_not_compare)
 {
     float value[3] = {0};
     Image image = {.width = 1, .height = 1, .channels = 3, .values = value}, other = image;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     assert_true(image_comparable(&image, &other, &messages));
     other.display = true;
     assert_false(image_comparable(&image, &other, &messages));
@@ -161,7 +152,6 @@ TEST(test_kinds_that_do_not_compare)
     other.channels = 1;
     assert_false(image_comparable(&image, &other, &messages));
     assert_int_equal(message_count(&messages, MESSAGE_ERROR), 2);
-    message_list_free(&messages);
 }
 
 // Green's construction keeps .30 R + .59 G + .11 B at the fraction wherever no channel is clipped.

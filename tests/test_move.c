@@ -182,36 +182,33 @@ static void check_bvh(const CompiledScene *compiled)
 TEST(moved_scene_has_the_numbers_of_a_compiled_one)
 {
     static const Vector3 eyes[] = {{1.3, 2.7, -39}, {0, -8.25, 0}, {1e4, 2, -1}, {1, 2, -40}};
-    Scene scene = scene_make();
+    OwnedScene scene = scene_make();
     const Camera start = scene.camera;
     for (int is_double = 0; is_double < 2; is_double++) {
         CompileSettings settings = single;
         if (is_double) settings.precision = PRECISION_DOUBLE;
         scene.camera = start;
-        CompiledScene moved = scene_compiled(&scene, &settings);
+        OwnedCompiledScene moved = scene_compiled(&scene, &settings);
         for (size_t i = 0; i < COUNT_OF(eyes); i++) {
             scene.camera.position = eyes[i];
             settings.width += 2;
             MessageList messages = {0};
             assert_true(scene_move(&moved, &scene, &settings, &messages));
-            CompiledScene expected = scene_compiled(&scene, &settings);
+            OwnedCompiledScene expected = scene_compiled(&scene, &settings);
             check_numbers(&moved, &expected);
             check_bvh(&moved);
-            compiled_scene_free(&expected);
         }
-        compiled_scene_free(&moved);
     }
-    scene_free(&scene);
 }
 
 // Only an eye next to the planet needs its power.
 TEST(powers_come_and_go)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("planet.yaml", "camera: {position: [0, 1e7, 0], look_at: [0, 0, 1]}\n"
                                      "objects:\n"
                                      "  - sphere: {center: [0, -6371000.3, 0], radius: 6371000.3}\n");
-    CompiledScene moved = scene_compiled(&scene, &single);
+    OwnedCompiledScene moved = scene_compiled(&scene, &single);
     assert_false(moved.features & FEATURE_EYE_POWERS);
     for (int i = 0; i < 4; i++) {
         const bool is_near = i % 2 == 0;
@@ -220,75 +217,64 @@ TEST(powers_come_and_go)
         assert_true(scene_move(&moved, &scene, &single, &messages));
         assert_int_equal(!(moved.features & FEATURE_EYE_POWERS), !is_near);
     }
-    compiled_scene_free(&moved);
-    scene_free(&scene);
 }
 
 // Another camera at the same place changes the header alone.
 TEST(turned_camera_changes_the_header_alone)
 {
-    Scene scene = scene_of_text("move.yaml", scene_text);
-    CompiledScene compiled = scene_compiled(&scene, &single);
+    OwnedScene scene = scene_of_text("move.yaml", scene_text);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &single);
     memset(compiled.changed, 0, sizeof compiled.changed);
     scene.camera.look_at = (Vector3){3, 3, 3};
     MessageList messages = {0};
     assert_true(scene_move(&compiled, &scene, &single, &messages));
     for (size_t type = 0; type < FLAT_COUNT; type++)
         assert_int_equal(compiled.changed[type], type == FLAT_HEADER);
-    CompiledScene expected = scene_compiled(&scene, &single);
+    OwnedCompiledScene expected = scene_compiled(&scene, &single);
     check_array(&compiled, &expected, FLAT_HEADER);
-    compiled_scene_free(&expected);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // A kernel may be built for a BVH that the scene does not have. Its one node stays empty.
 TEST(missing_bvh_stays_empty)
 {
-    Scene scene = scene_of_text("move.yaml", scene_text);
+    OwnedScene scene = scene_of_text("move.yaml", scene_text);
     CompileSettings settings = single;
     settings.bvh = BVH_OFF;
     settings.extra_features = FEATURE_BVH;
-    CompiledScene compiled = scene_compiled(&scene, &settings), expected = scene_compiled(&scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &settings),
+                       expected = scene_compiled(&scene, &settings);
     scene.camera.position.z -= 1;
     MessageList messages = {0};
     assert_true(scene_move(&compiled, &scene, &settings, &messages));
     check_array(&compiled, &expected, FLAT_NODES);
-    compiled_scene_free(&expected);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // Moves to eyes at which the device's unit changes or which do not fit, and back.
 TEST(far_eyes)
 {
-    Scene scene = scene_of_text("move.yaml", scene_text);
+    OwnedScene scene = scene_of_text("move.yaml", scene_text);
     const Vector3 start = scene.camera.position;
-    CompiledScene compiled = scene_compiled(&scene, &single);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &single);
     static const double distances[] = {1e11, 1e39, 0};
     for (size_t i = 0; i < COUNT_OF(distances); i++) {
         scene.camera.position = (Vector3){start.x, start.y, start.z - distances[i]};
-        MessageList messages = {0};
+        OwnedMessageList messages = {0};
         const bool moved = scene_move(&compiled, &scene, &single, &messages);
         assert_int_equal(moved, distances[i] != 1e39);
         assert_int_equal(message_count(&messages, MESSAGE_ERROR), !moved);
-        message_list_free(&messages);
         if (!moved) continue;
-        CompiledScene expected = scene_compiled(&scene, &single);
+        OwnedCompiledScene expected = scene_compiled(&scene, &single);
         assert_true(compiled.unit == expected.unit);
         assert_true((compiled.unit != 1) == (distances[i] == 1e11));
         check_numbers(&compiled, &expected);
-        compiled_scene_free(&expected);
     }
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // Fails to move to one camera, then moves to the other.
 static void check_move_after_failure(const char *text, const Camera *failing, const Camera *next)
 {
-    Scene scene = scene_of_text("move.yaml", text);
-    CompiledScene compiled = scene_compiled(&scene, &single);
+    OwnedScene scene = scene_of_text("move.yaml", text);
+    OwnedCompiledScene compiled = scene_compiled(&scene, &single);
     MessageList messages = {0};
     scene.camera = *failing;
     assert_false(scene_move(&compiled, &scene, &single, &messages));
@@ -296,12 +282,9 @@ static void check_move_after_failure(const char *text, const Camera *failing, co
     message_list_free(&messages);
     scene.camera = *next;
     assert_true(scene_move(&compiled, &scene, &single, &messages));
-    CompiledScene expected = scene_compiled(&scene, &single);
+    OwnedCompiledScene expected = scene_compiled(&scene, &single);
     check_numbers(&compiled, &expected);
     if (expected.pending_children_max > 0) check_bvh(&compiled);
-    compiled_scene_free(&expected);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // A move that failed has changed some arrays. The next one, to whichever eye, must set all of them.
@@ -314,7 +297,7 @@ TEST(moves_after_a_failure)
                                  "  - plane: {point: [0, 0, 90], normal: [0, 1, -1]}\n";
     static const char *const texts[] = {planes, scene_text};
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
-        Scene scene = scene_of_text("move.yaml", texts[i]);
+        OwnedScene scene = scene_of_text("move.yaml", texts[i]);
         const Camera start = scene.camera;
         Camera other = start, wide, far = start;
         other.position = (Vector3){3, 4, -50};
@@ -324,7 +307,6 @@ TEST(moves_after_a_failure)
         check_move_after_failure(texts[i], &wide, &other); // the eye was right
         check_move_after_failure(texts[i], &wide, &start); // the eye was right before
         check_move_after_failure(texts[i], &far, &start);
-        scene_free(&scene);
     }
 }
 

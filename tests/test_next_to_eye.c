@@ -26,11 +26,10 @@ static CompiledScene compile(const Scene *scene, Precision precision)
 
 static CompiledScene compile_text(const char *objects, Precision precision)
 {
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "next.yaml",
         formatted("camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\nobjects:\n%s", objects));
     CompiledScene compiled = compile(&scene, precision);
-    scene_free(&scene);
     return compiled;
 }
 
@@ -55,11 +54,9 @@ TEST(ordinary_scenes_have_no_powers)
     static const char *const files[] = {"tests/scenes/every_shape.yaml", "scenes/cylinders-cones.yaml",
                                         "scenes/triangles.yaml"};
     for (size_t i = 0; i < COUNT_OF(files); i++) {
-        Scene scene = scene_of_file(files[i]);
-        CompiledScene compiled = compile(&scene, PRECISION_SINGLE);
+        OwnedScene scene = scene_of_file(files[i]);
+        OwnedCompiledScene compiled = compile(&scene, PRECISION_SINGLE);
         assert_false(compiled.features & FEATURE_EYE_POWERS);
-        compiled_scene_free(&compiled);
-        scene_free(&scene);
     }
 }
 
@@ -68,7 +65,7 @@ TEST(a_cylinder_is_seen_from_its_nearest_point)
 {
     const double radius = 6371001, height = 1.75;
     for (int precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
-        CompiledScene compiled =
+        OwnedCompiledScene compiled =
             compile_text("  - cylinder: {from: [0, -6371001, -1234567.8], to: [0, -6371001, 7654321.1], "
                          "radius: 6371001}\n",
                          (Precision)precision);
@@ -84,20 +81,18 @@ TEST(a_cylinder_is_seen_from_its_nearest_point)
         Bounds bounds;
         assert_true(primitive_bounds(TYPE_CYLINDERS, cylinder, &bounds));
         assert_true(fabs(bounds.min.z + 1234567.8) < 1 && fabs(bounds.max.z - 7654321.1) < 1);
-        compiled_scene_free(&compiled);
     }
 }
 
 TEST(a_plane_goes_through_its_nearest_point)
 {
-    CompiledScene compiled =
+    OwnedCompiledScene compiled =
         compile_text("  - plane: {point: [2e7, -1e7, 0], normal: [1, 2, 3]}\n", PRECISION_SINGLE);
     const Plane *plane = first(&compiled, TYPE_PLANES);
     const double height = -3.5 / 14; // of the plane over the eye, in normals
     assert_true(fabs(plane->point.x - height) < 1e-7);
     assert_true(fabs(plane->point.y - 2 * height) < 1e-7);
     assert_true(fabs(plane->point.z - 3 * height) < 1e-7);
-    compiled_scene_free(&compiled);
 }
 
 // Explicit rays may start next to the plane's stored point. In double that point is exact. The point nearest
@@ -105,15 +100,13 @@ TEST(a_plane_goes_through_its_nearest_point)
 TEST(explicit_rays_see_a_plane_through_its_own_point)
 {
     const double point[3] = {-7351234.1, 1534783.4, 1735961.9};
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "far.yaml", formatted("camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\n"
                               "objects:\n  - plane: {point: [%.17g, %.17g, %.17g], normal: [1, 2, 3]}\n",
                               point[0], point[1], point[2]));
-    CompiledScene compiled = compile_for(&scene, PRECISION_DOUBLE, false);
+    OwnedCompiledScene compiled = compile_for(&scene, PRECISION_DOUBLE, false);
     const Plane *plane = first(&compiled, TYPE_PLANES);
     assert_true(plane->point.x == point[0] && plane->point.y == point[1] && plane->point.z == point[2]);
-    compiled_scene_free(&compiled);
-    scene_free(&scene);
 }
 
 // The stored height and normal are those of the triangle before its vertices are rounded, also in double,
@@ -127,7 +120,7 @@ TEST(a_triangle_has_the_eyes_height)
                                  "[15e15, 15e15, -15e15]]}\n"
                                : "  - triangle: {vertices: [[22345677, -11172838.5, 0], "
                                  "[-33518515.5, 0, 11172838.5], [11172838.5, 11172838.5, -11172838.5]]}\n";
-        CompiledScene compiled = compile_text(text, (Precision)precision);
+        OwnedCompiledScene compiled = compile_text(text, (Precision)precision);
         const Triangle *triangle = first(&compiled, TYPE_TRIANGLES);
         assert_true(compiled.features & FEATURE_EYE_POWERS);
         float height;
@@ -137,7 +130,6 @@ TEST(a_triangle_has_the_eyes_height)
         const double expected = fabs(2 * 1.75 / sqrt(14));
         const double error = fabs(fabs((double)height) / vector_length(normal) / expected - 1);
         assert_true(error < (is_double ? 0x1p-51 : 0x1p-23));
-        compiled_scene_free(&compiled);
     }
 }
 

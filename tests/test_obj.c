@@ -18,8 +18,8 @@
 // Reads the scene of the mesh. All messages with their files, one per line, must equal `expected`.
 static bool scene_read(Scene *scene, const char *text, const char *expected)
 {
-    MessageList messages = {0};
-    Text source = {0}, got = {0};
+    OwnedMessageList messages = {0};
+    OwnedText source = {0}, got = {0};
     text_appendf(&source, "%s", text);
     const bool read = scene_read_text(scene, "scene.yaml", &source, false, &messages);
     for (size_t i = 0; i < messages.count; i++) {
@@ -27,9 +27,6 @@ static bool scene_read(Scene *scene, const char *text, const char *expected)
         message_describe(&got, &messages.items[i]);
     }
     assert_string_equal(text_c(&got), expected);
-    message_list_free(&messages);
-    text_free(&source);
-    text_free(&got);
     return read;
 }
 
@@ -49,7 +46,7 @@ static Vector3 corner_of(const Mesh *mesh, size_t corner)
 static void assert_unit_square(const char *obj, const char *messages)
 {
     static const double expected[6][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
-    Scene scene = scene_of_obj(obj, messages);
+    OwnedScene scene = scene_of_obj(obj, messages);
     const Mesh *mesh = &scene.meshes.items[0];
     assert_int_equal(mesh->triangle_count, 2);
     for (size_t i = 0; i < 6; i++) {
@@ -57,7 +54,6 @@ static void assert_unit_square(const char *obj, const char *messages)
         const Vector3 corner = corner_of(mesh, i);
         assert_vector(corner, expected[i][0], expected[i][1], 0);
     }
-    scene_free(&scene);
 }
 
 TEST(layouts_are_read)
@@ -80,9 +76,8 @@ TEST(layouts_are_read)
     };
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
-            Text text = text_with_line_ends(texts[i], ends);
+            OwnedText text = text_with_line_ends(texts[i], ends);
             assert_unit_square(text_c(&text), "");
-            text_free(&text);
         }
     }
 }
@@ -98,7 +93,7 @@ TEST(short_faces_are_reported)
 // The same position with other normals and texture coordinates is another vertex. The same of all is not.
 TEST(corners_combine_their_parts)
 {
-    Scene scene = scene_of_obj(
+    OwnedScene scene = scene_of_obj(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nvt 0.5\nvt 0.25 0.75 9\nvn 0 0 2\nvn 3 0 0\nvn 0 0 1\n"
         "f 1/1/1 2/2/1 3//2\nf 4/1/3 2/2/1 3/1/2\nf 1 2/2/1 3//2\n",
         "");
@@ -116,25 +111,22 @@ TEST(corners_combine_their_parts)
     assert_number(mesh->uvs[triangles[0][0]][1], 0);
     assert_number(mesh->uvs[triangles[0][1]][1], 0.75);
     assert_number(mesh->uvs[triangles[0][2]][0], 0);
-    scene_free(&scene);
 }
 
 // More combinations at one position than are compared with each other.
 TEST(one_position_may_have_many_normals)
 {
     enum { NORMALS = 300 };
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, CORNERS);
     for (int i = 0; i < NORMALS; i++)
         text_appendf(&text, "vn %d 1 0\n", i);
     for (int round = 0; round < 2; round++)
         for (int i = 1; i <= NORMALS; i++)
             text_appendf(&text, "f 1//%d 2//1 3//1\n", i);
-    Scene scene = scene_of_obj(text_c(&text), "");
+    OwnedScene scene = scene_of_obj(text_c(&text), "");
     assert_int_equal(scene.meshes.items[0].triangle_count, 2 * NORMALS);
     assert_int_equal(scene.meshes.items[0].vertex_count, NORMALS + 2);
-    scene_free(&scene);
-    text_free(&text);
 }
 
 static const Material *triangle_material(const Scene *scene, size_t triangle)
@@ -170,7 +162,7 @@ TEST(opacity_is_dissolve)
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.mtl",
                    formatted("newmtl red\nKd 0.5 0 0\nKs 0.5\nNi 1.5\n%smap_Kd a.ppm\n", cases[i].lines));
-        Scene scene =
+        OwnedScene scene =
             scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
         const Material *red = triangle_material(&scene, 0);
         assert_number(red->diffuse.x, 0.5 * cases[i].diffuse);
@@ -178,27 +170,25 @@ TEST(opacity_is_dissolve)
         assert_number(red->specular.largest, cases[i].specular);
         assert_number(red->transmission.largest, cases[i].transmission);
         assert_number(red->ior, cases[i].ior);
-        scene_free(&scene);
     }
 }
 
 TEST(invalid_numbers_become_defaults)
 {
     file_write("a.mtl", "newmtl red\nKd -1 0 0\nNi 0\nNs -5\nd 7\nKs 0 -2\nillum 11\nTr -1\n");
-    Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
-                               "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n"
-                               "a.mtl:3:4: warning: must be greater than 0, not 0: the default is used\n"
-                               "a.mtl:4:4: warning: must be 0 or more, not -5: the default is used\n"
-                               "a.mtl:5:3: warning: must be from 0 to 1, not 7: the default is used\n"
-                               "a.mtl:6:6: warning: must be 0 or more, not -2: the default is used\n"
-                               "a.mtl:7:7: warning: must be from 0 to 10, not 11: the default is used\n"
-                               "a.mtl:8:4: warning: must be from 0 to 1, not -1: the default is used\n");
+    OwnedScene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
+                                    "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n"
+                                    "a.mtl:3:4: warning: must be greater than 0, not 0: the default is used\n"
+                                    "a.mtl:4:4: warning: must be 0 or more, not -5: the default is used\n"
+                                    "a.mtl:5:3: warning: must be from 0 to 1, not 7: the default is used\n"
+                                    "a.mtl:6:6: warning: must be 0 or more, not -2: the default is used\n"
+                                    "a.mtl:7:7: warning: must be from 0 to 10, not 11: the default is used\n"
+                                    "a.mtl:8:4: warning: must be from 0 to 1, not -1: the default is used\n");
     const Material *red = triangle_material(&scene, 0);
     assert_vector(red->color, 1, 1, 1);
     assert_number(red->shininess, material_default().shininess);
     assert_number(red->specular.largest, 0);
     assert_number(red->transmission.largest, 0);
-    scene_free(&scene);
 }
 
 // Polygons become triangles, and the materials move with them.
@@ -352,10 +342,10 @@ TEST(bumps_are_normals)
                                       i % 2    ? "norm"
                                       : i == 0 ? "map_Bump"
                                                : "bump"));
-        Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n",
-                                   i == 3 ? "a.mtl:3:6: warning: a second map of normals or heights: it "
-                                            "replaces the first\n"
-                                          : "");
+        OwnedScene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n",
+                                        i == 3 ? "a.mtl:3:6: warning: a second map of normals or heights: it "
+                                                 "replaces the first\n"
+                                               : "");
         const Material *red = triangle_material(&scene, 0);
         assert_int_equal(red->normal_map.texture, 1);
         assert_number(red->normal_map.strength, -2.5);
@@ -368,7 +358,6 @@ TEST(bumps_are_normals)
         const size_t at = is_ramp ? 3 : 0;
         const Vector3 got = {values[at], values[at + 1], values[at + 2]};
         assert_true(vector_length(vector_subtract(got, expected)) < 1e-6);
-        scene_free(&scene);
     }
 }
 
@@ -378,7 +367,7 @@ TEST(what_is_not_used_is_reported_once)
         "a.mtl",
         "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_refl b.png\n"
         "newmtl more\nTf 1 0 0\nmap_refl b.png\nPr 0.5\n");
-    Scene scene = scene_of_obj(
+    OwnedScene scene = scene_of_obj(
         "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt nan 0\nvt 0 1e31\nvn 0 inf 0\n"
         "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
         "scene.yaml:4:18: warning: a.obj: texture coordinates that are not finite or too large, "
@@ -403,7 +392,6 @@ TEST(what_is_not_used_is_reported_once)
     assert_number(red->shininess, material_default().shininess);
     assert_number(red->transmission.largest, 0);
     assert_number(red->ior, 1);
-    scene_free(&scene);
 }
 
 // Faces are read without texture coordinates and normals that the file lacks.
@@ -429,14 +417,13 @@ TEST(missing_parts_are_dropped)
          false},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        Scene scene = scene_of_obj(cases[i].obj, cases[i].expected);
+        OwnedScene scene = scene_of_obj(cases[i].obj, cases[i].expected);
         const Mesh *mesh = &scene.meshes.items[0];
         assert_int_equal(mesh->uvs != NULL, cases[i].has_uvs);
         assert_int_equal(mesh->normals != NULL, cases[i].has_normals);
         assert_vector(corner_of(mesh, 1), 1, 0, 0);
         if (mesh->normals) assert_vector(mesh->normals[mesh->triangles[0][0]], 0, 0, 1);
         if (mesh->normals) assert_vector(mesh->normals[mesh->triangles[0][2]], 0, 0, 0);
-        scene_free(&scene);
     }
 }
 
@@ -479,7 +466,7 @@ TEST(files_have_each_message_once)
 // The faces have nine times the most corners of a face, which would take half a minute to cut.
 TEST(many_large_polygons_are_refused)
 {
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, CORNERS);
     for (int face = 0; face < 9; face++) {
         text_appendf(&text, "f");
@@ -489,7 +476,6 @@ TEST(many_large_polygons_are_refused)
     }
     Scene scene;
     file_write("a.obj", text_c(&text));
-    text_free(&text);
     assert_false(
         scene_read(&scene, SCENE_OF(""),
                    "scene.yaml:4:18: error: a.obj: polygons of too many corners: the sum of their squares is "
@@ -536,12 +522,11 @@ TEST(faults_have_their_place)
     file_write_bytes("a.obj", "v 0\0", 4);
     Scene scene;
     assert_false(scene_read(&scene, SCENE_OF(""), "a.obj:1:4: error: not text: a NUL character\n"));
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, CORNERS "f");
     for (int i = 0; i <= 16384; i++)
         text_appendf(&text, " 1");
     file_write("a.obj", text_c(&text));
-    text_free(&text);
     assert_false(
         scene_read(&scene, SCENE_OF(""), "a.obj:4:2: error: a face of 16385 corners; 16384 is the most\n"));
 }
@@ -567,8 +552,8 @@ TEST(test_progress)
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
     Progress progress = {.stage = stage_open(false)};
     const SceneOptions options = {.file_named = progress_note, .context = &progress, .stage = progress.stage};
-    MessageList messages = {0};
-    Scene scene;
+    OwnedMessageList messages = {0};
+    OwnedScene scene;
     assert_true(scene_read_yaml(&scene, &source, &options, &messages));
     text_appendf(&progress.seen, ", ");
     progress_note(&progress, "then");
@@ -578,8 +563,6 @@ TEST(test_progress)
                         "a.mtl: reading a.obj 89%, then: reading the objects of scene.yaml 50%");
     text_free(&progress.seen);
     stage_close(progress.stage);
-    message_list_free(&messages);
-    scene_free(&scene);
 }
 
 TEST_MAIN(folder_open, folder_close)

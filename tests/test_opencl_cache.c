@@ -20,15 +20,14 @@ enum { CODE_LENGTH = sizeof machine_code, FORMAT_OFFSET = 8, FORMAT_END = 16 };
 
 static void store(const char *entry_key)
 {
-    Text binary = {0};
+    OwnedText binary = {0};
     text_append(&binary, machine_code, CODE_LENGTH);
     cache_store(entry_key, &binary, NULL);
-    text_free(&binary);
 }
 
 static bool loads_with(const char *entry_key, WarningReceiver *warnings)
 {
-    Text binary = {0};
+    OwnedText binary = {0};
     bool found = cache_load(entry_key, &binary, warnings);
     if (found) {
         assert_int_equal(binary.count, CODE_LENGTH);
@@ -36,7 +35,6 @@ static bool loads_with(const char *entry_key, WarningReceiver *warnings)
     } else {
         assert_int_equal(binary.count, 0);
     }
-    text_free(&binary);
     return found;
 }
 
@@ -60,10 +58,9 @@ TEST_WITH(stored_entries_are_loaded, scratch_set_up, scratch_tear_down)
 
 static void entry_set_used(const char *entry_key, time_t when)
 {
-    char *path = cache_entry_path(entry_key);
+    OWNED char *path = cache_entry_path(entry_key);
     const struct timespec moments[2] = {{when, 0}, {when, 0}};
     assert_int_equal(utimensat(AT_FDCWD, path, moments, 0), 0);
-    free(path);
 }
 
 // Whatever the umask permits, entries are private.
@@ -72,13 +69,11 @@ TEST_WITH(files_are_private, scratch_set_up, scratch_tear_down)
     mode_t before = umask(0);
     store(key);
     umask(before);
-    char *path = cache_entry_path(key), *cache = cache_folder_path();
+    OWNED char *path = cache_entry_path(key), *cache = cache_folder_path();
     assert_int_equal(mode_of(path), 0600);
     assert_int_equal(mode_of(cache), 0700);
     assert_int_equal(chdir(cache), 0);
     assert_int_equal(mode_of("hash-key"), 0600);
-    free(path);
-    free(cache);
 }
 
 static void warnings_print(void *context, MessageList *warnings)
@@ -128,7 +123,7 @@ static void assert_refused(const char *reason)
 TEST_WITH(entry_that_others_can_access_is_replaced, scratch_set_up, scratch_tear_down)
 {
     static const mode_t modes[] = {0620, 0602, 0644};
-    char *path = cache_entry_path(key);
+    OWNED char *path = cache_entry_path(key);
     for (size_t i = 0; i < COUNT_OF(modes); i++) {
         store(key);
         assert_int_equal(chmod(path, modes[i]), 0);
@@ -137,13 +132,12 @@ TEST_WITH(entry_that_others_can_access_is_replaced, scratch_set_up, scratch_tear
         assert_true(loads(key));
         assert_int_equal(mode_of(path), 0600);
     }
-    free(path);
 }
 
 // Nothing is loaded from a folder that belongs to another user, or stored in it.
 TEST_WITH(folder_of_others_is_not_used, scratch_set_up, scratch_tear_down)
 {
-    char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
+    OWNED char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
     assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
     for (int type = 0; type < 3; type++) {
         store(key);
@@ -173,15 +167,12 @@ TEST_WITH(folder_of_others_is_not_used, scratch_set_up, scratch_tear_down)
             assert_int_equal(rename(moved, cache), 0);
         }
     }
-    free(path);
-    free(cache);
-    free(moved);
 }
 
 // Entries are useless without the key of their hash. A key that others may know is replaced.
 TEST_WITH(hash_key_that_others_can_know_is_replaced, scratch_set_up, scratch_tear_down)
 {
-    char *cache = cache_folder_path();
+    OWNED char *cache = cache_folder_path();
     store(key);
     assert_int_equal(chdir(cache), 0);
     assert_int_equal(chmod("hash-key", 0640), 0);
@@ -193,7 +184,6 @@ TEST_WITH(hash_key_that_others_can_know_is_replaced, scratch_set_up, scratch_tea
     store(key);
     assert_true(loads(key));
     assert_int_equal(mode_of("hash-key"), 0600);
-    free(cache);
 }
 
 // A file of 20 GB without contents is not read, and goes first.
@@ -201,7 +191,7 @@ TEST_WITH(entry_that_is_too_large_is_not_read, scratch_set_up, scratch_tear_down
 {
     store(key);
     store("another key");
-    char *path = cache_entry_path(key);
+    OWNED char *path = cache_entry_path(key);
     assert_int_equal(truncate(path, (off_t)20 << 30), 0);
     assert_refused("it is larger than the limit");
     entry_set_used(key, 1u << 31);
@@ -209,14 +199,12 @@ TEST_WITH(entry_that_is_too_large_is_not_read, scratch_set_up, scratch_tear_down
     assert_int_equal(access(path, F_OK), -1);
     assert_true(loads("another key"));
 
-    Text binary = {0};
+    OwnedText binary = {0};
     array_reserve(binary, CACHE_ENTRY_BYTES_MAX);
     binary.count = CACHE_ENTRY_BYTES_MAX;
     cache_store(key, &binary, NULL);
     assert_int_equal(access(path, F_OK), -1);
     binary.count = 0;
-    text_free(&binary);
-    free(path);
 }
 
 // Four processes on an empty cache make one key of the hash, so that all load what each stores.
@@ -256,9 +244,9 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
     store(key);
     store(described);
     entry_set_used(described, 1000);
-    char *path = cache_entry_path(key);
+    OWNED char *path = cache_entry_path(key);
     // an entry of another version is not a fault
-    Text content = file_text(path);
+    OwnedText content = file_text(path);
     content.items[FORMAT_OFFSET]++;
     memset(content.items + FORMAT_END, 0xff, content.count - FORMAT_END); // whatever follows the format
     const size_t lengths[] = {FORMAT_END, content.count};
@@ -270,7 +258,6 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
         assert_null(entries.items[1].device);
         cache_entries_free(&entries);
     }
-    text_free(&content);
     file_write_bytes(path, machine_code, CODE_LENGTH);
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);
@@ -285,13 +272,12 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 0);
     assert_int_equal(messages.count, 0);
-    free(path);
 }
 
 TEST_WITH(failure_to_clear_is_reported, scratch_set_up, scratch_tear_down)
 {
-    MessageList messages = {0};
-    char *path = cache_folder_path(), *secret;
+    OwnedMessageList messages = {0};
+    OWNED char *path = cache_folder_path(), *secret;
     assert_true(asprintf(&secret, "%s/hash-key", path) > 0);
     store(key);
     assert_true(cache_clear(&messages));
@@ -300,20 +286,16 @@ TEST_WITH(failure_to_clear_is_reported, scratch_set_up, scratch_tear_down)
     assert_int_equal(messages.count, 1);
     assert_string_equal(messages.items[0].text,
                         "cannot remove 'hash-key' of the kernel cache: Is a directory");
-    message_list_free(&messages);
     rmdir(secret);
-    free(secret);
-    free(path);
 }
 
 TEST_WITH(folder_without_rights_is_not_used, scratch_set_up, scratch_tear_down)
 {
-    char *cache = cache_folder_path();
+    OWNED char *cache = cache_folder_path();
     store(key);
     assert_int_equal(chmod(cache, 0), 0);
     assert_load_refused(load_without_rights, "Permission denied");
     assert_int_equal(chmod(cache, 0700), 0);
-    free(cache);
 }
 
 // However few files may be open, no entry is left out in silence, and none is called removed that is not.
@@ -350,8 +332,8 @@ TEST_WITH(too_few_descriptors_are_reported, scratch_set_up, scratch_tear_down)
 TEST_WITH(damaged_entry_is_not_loaded, scratch_set_up, scratch_tear_down)
 {
     store(key);
-    char *path = cache_entry_path(key);
-    Text entry = file_text(path);
+    OWNED char *path = cache_entry_path(key);
+    OwnedText entry = file_text(path);
     assert_true(entry.count > strlen(key) + CODE_LENGTH);
     for (size_t i = 0; i < entry.count; i++) {
         entry.items[i] ^= 0x10;
@@ -371,8 +353,6 @@ TEST_WITH(damaged_entry_is_not_loaded, scratch_set_up, scratch_tear_down)
 
     store(key);
     assert_true(loads(key));
-    text_free(&entry);
-    free(path);
 }
 
 // The entry of one key lies where another is looked for, as if both had the same hash.
@@ -380,28 +360,25 @@ TEST_WITH(entry_of_another_key_is_not_loaded, scratch_set_up, scratch_tear_down)
 {
     store("another key");
     store(key);
-    char *from = cache_entry_path("another key"), *to = cache_entry_path(key);
+    OWNED char *from = cache_entry_path("another key"), *to = cache_entry_path(key);
     assert_int_equal(rename(from, to), 0);
     assert_false(loads(key));
-    free(from);
-    free(to);
 }
 
 TEST_WITH(entry_without_rights_is_replaced, scratch_set_up, scratch_tear_down)
 {
     store(key);
-    char *path = cache_entry_path(key);
+    OWNED char *path = cache_entry_path(key);
     assert_int_equal(chmod(path, 0), 0);
     if (geteuid() != 0) assert_false(loads(key));
     store(key);
     assert_true(loads(key));
-    free(path);
 }
 
 // What is not an entry is replaced when the key is stored. A pipe that nobody writes into is not waited for.
 TEST_WITH(foreign_entry_is_replaced, scratch_set_up, scratch_tear_down)
 {
-    char *path = cache_entry_path(key), *other = cache_entry_path("another key");
+    OWNED char *path = cache_entry_path(key), *other = cache_entry_path("another key");
     alarm(60);
     for (int type = 0; type < 3; type++) {
         store(key);
@@ -424,14 +401,12 @@ TEST_WITH(foreign_entry_is_replaced, scratch_set_up, scratch_tear_down)
         assert_true(S_ISREG(status.st_mode) && status.st_uid == geteuid());
     }
     alarm(0);
-    free(path);
-    free(other);
 }
 
 TEST_WITH(missing_folder_disables_cache, scratch_set_up, scratch_tear_down)
 {
     const char *before = getenv("HOME");
-    char *home = before ? strdup(before) : NULL;
+    OWNED char *home = before ? strdup(before) : NULL;
     unsetenv("HOME");
     unsetenv("XDG_CACHE_HOME");
     assert_null(cache_entry_path(key));
@@ -443,47 +418,41 @@ TEST_WITH(missing_folder_disables_cache, scratch_set_up, scratch_tear_down)
     assert_int_not_equal(access("relative", F_OK), 0);
 
     setenv("HOME", scratch, 1);
-    char *path = cache_entry_path(key), *expected = NULL;
+    OWNED char *path = cache_entry_path(key), *expected = NULL;
     assert_true(asprintf(&expected, "%s/.cache/glint/", scratch) > 0);
     assert_memory_equal(path, expected, strlen(expected));
     store(key);
     assert_true(loads(key));
-    free(path);
-    free(expected);
     if (home)
         setenv("HOME", home, 1);
     else
         unsetenv("HOME");
-    free(home);
 }
 
 // A file in place of the folder stops even root.
 TEST_WITH(unwritable_folder_disables_cache, scratch_set_up, scratch_tear_down)
 {
-    char *path = NULL;
+    OWNED char *path = NULL;
     assert_true(asprintf(&path, "%s/glint", scratch) > 0);
     file_write_bytes(path, "in the way", 10);
     store(key);
     assert_false(loads(key));
     CacheEntries entries;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     assert_false(cache_list(&entries, &messages));
     assert_int_equal(messages.count, 1);
     assert_non_null(strstr(messages.items[0].text, "is not used: Not a directory"));
-    message_list_free(&messages);
-    free(path);
 }
 
 TEST_WITH(folder_in_place_of_an_entry_is_kept, scratch_set_up, scratch_tear_down)
 {
     store(key);
-    char *path = cache_entry_path(key);
+    OWNED char *path = cache_entry_path(key);
     assert_int_equal(unlink(path), 0);
     assert_int_equal(mkdir(path, 0700), 0);
     assert_false(loads(key));
     store(key);
     assert_false(loads(key));
-    free(path);
 }
 
 // While two processes replace the entry, a reader always finds it whole.
@@ -519,16 +488,15 @@ TEST_WITH(least_recently_used_entries_are_trimmed, scratch_set_up, scratch_tear_
         entry_set_used(keys[i], 1000 + i);
     }
     assert_true(loads("key a"));
-    char *path = cache_entry_path("key a");
+    OWNED char *path = cache_entry_path("key a");
     struct stat status;
     assert_int_equal(stat(path, &status), 0);
     *strrchr(path, '/') = '\0';
     uint64_t size = (uint64_t)status.st_size;
     cache_trim(KEY_COUNT * size, NULL);
     for (int i = 1; i < KEY_COUNT; i++) {
-        char *kept = cache_entry_path(keys[i]);
+        OWNED char *kept = cache_entry_path(keys[i]);
         assert_int_equal(access(kept, F_OK), 0);
-        free(kept);
     }
     cache_trim(2 * size + size / 2, NULL);
     assert_false(loads("key b"));
@@ -549,7 +517,6 @@ TEST_WITH(least_recently_used_entries_are_trimmed, scratch_set_up, scratch_tear_
         assert_int_equal(unlinkat(cache, others[i], 0), 0);
     }
     close(cache);
-    free(path);
 }
 
 TEST_MAIN(NULL, NULL)

@@ -16,7 +16,7 @@ static const EmbeddedFile files[] = {
 
 TEST(test_each_include_once)
 {
-    char *text = kernel_compose(files, "root.cl", "#define X 1");
+    OWNED char *text = kernel_compose(files, "root.cl", "#define X 1");
     assert_string_equal(text, "#line 1 \"prelude\"\n#define X 1\n"
                               "#line 1 \"root.cl\"\n// root\n"
                               "#line 1 \"a.h\"\nfirst of a\n"
@@ -26,7 +26,6 @@ TEST(test_each_include_once)
                               "#line 3 \"root.cl\"\n"
                               "\n#line 4 \"root.cl\"\n"
                               "\n#line 5 \"root.cl\"\nlast\n");
-    free(text);
 }
 
 static void compose_root(void *root)
@@ -44,10 +43,9 @@ TEST(test_missing_files)
 TEST(test_every_embedded_file_composes)
 {
     for (const EmbeddedFile *file = kernel_files; file->name; file++) {
-        char *text = program_text(file->name, "");
+        OWNED char *text = program_text(file->name, "");
         if (!text) fail_msg("%s", file->name);
         assert_null(strstr(text ? text : "", "\n#include \""));
-        free(text);
     }
 }
 

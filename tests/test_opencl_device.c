@@ -93,7 +93,7 @@ TEST(test_choice)
     Machine machine = {0};
     machine_fill(&machine);
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        MessageList messages = {0};
+        OwnedMessageList messages = {0};
         const Device *device = device_choose(&machine.list, cases[i].selector, &messages);
         int index = device ? (int)device->index : -1;
         if (index != cases[i].index)
@@ -105,7 +105,6 @@ TEST(test_choice)
                 strstr(messages.items[0].text, cases[i].selector ? cases[i].selector : "no usable"));
             assert_non_null(strstr(messages.items[0].text, "2 (Iris Mute, gpu, unusable: no compiler)"));
         }
-        message_list_free(&messages);
     }
 }
 
@@ -113,7 +112,7 @@ TEST(test_choice_falls_back)
 {
     Machine machine = {0};
     machine_fill(&machine);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     machine.list.count = 3;
     assert_int_equal(device_choose(&machine.list, NULL, &messages)->index, 0);
     machine.items[0].available = false;
@@ -129,7 +128,6 @@ TEST(test_choice_falls_back)
     assert_null(device_choose(&machine.list, NULL, &messages));
     assert_non_null(strstr(messages.items[2].text, "pocl-opencl-icd"));
     assert_null(strstr(messages.items[2].text, "HOME"));
-    message_list_free(&messages);
 }
 
 TEST(test_lanes)
@@ -202,7 +200,7 @@ TEST(test_list_of_this_machine)
 TEST(test_list_without_platforms)
 {
     const char *before = getenv("OCL_ICD_VENDORS");
-    char *kept = before ? strdup(before) : NULL;
+    OWNED char *kept = before ? strdup(before) : NULL;
     char *empty = scratch_open();
     setenv("OCL_ICD_VENDORS", empty, 1);
     ListFacts facts = {.count = 99};
@@ -211,7 +209,6 @@ TEST(test_list_without_platforms)
     assert_true(facts.sound);
     unsetenv("OCL_ICD_VENDORS");
     if (kept) setenv("OCL_ICD_VENDORS", kept, 1);
-    free(kept);
     scratch_close(empty);
 }
 

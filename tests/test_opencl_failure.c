@@ -25,11 +25,10 @@ static void call_fail(const char *call, size_t index, bool returns_null, bool is
         assert_memory_equal(&answer, &right, sizeof answer);
     } else {
         assert_string_equal(compute.failure.call, call);
-        char *text = compute_failure_text(&compute);
+        OWNED char *text = compute_failure_text(&compute);
         assert_ptr_equal(strstr(text, call), text);
         assert_non_null(strstr(text, returns_null ? "NULL with CL_SUCCESS" : "CL_OUT_OF_RESOURCES (-5)"));
         assert_non_null(strstr(text, work_device->name));
-        free(text);
     }
     compute_close_checked(&compute);
 }
@@ -107,10 +106,9 @@ TEST(test_empty_build_log)
         Compute compute;
         Answer answer;
         assert_false(work(&compute, &answer));
-        char *text = compute_failure_text(&compute);
+        OWNED char *text = compute_failure_text(&compute);
         assert_non_null(strstr(text, "the driver gives no build log"));
         assert_int_equal(strstr(text, "is full (12 KiB free)") != NULL, full);
-        free(text);
         compute_close_checked(&compute);
     }
     disk_is_full = false;
@@ -126,7 +124,7 @@ TEST(test_builds)
     calls_fail("clBuildProgram", false, false);
     calls_fail("clCreateKernel", false, false);
     calls_fail("clCreateKernel", true, false);
-    char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
+    OWNED char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
     some_calls_fail("clCreateProgramWithSource", 1, false, false);
     call_fail("clCreateProgramWithSource", EVERY_CALL, false, true);
@@ -140,7 +138,6 @@ TEST(test_builds)
         setenv("XDG_CACHE_HOME", cache, 1);
     else
         unsetenv("XDG_CACHE_HOME");
-    free(cache);
 }
 
 // The list says which call failed first, and so does the message where no device is left.
@@ -153,7 +150,7 @@ TEST(test_discovery)
         for (size_t index = 0, count = 1; index < count; index++) {
             call_counts_clear();
             DeviceList list;
-            MessageList messages = {0};
+            OwnedMessageList messages = {0};
             device_list_open(&list, NULL);
             const Device *chosen = device_choose(&list, NULL, &messages);
             assert_int_equal(messages.count, chosen == NULL);
@@ -163,7 +160,6 @@ TEST(test_discovery)
                 snprintf(failure, sizeof failure, "(%s: CL_OUT_OF_RESOURCES (-5))", queries[i]);
                 assert_non_null(strstr(messages.items[0].text, failure));
             }
-            message_list_free(&messages);
             device_list_close(&list);
             if (!injected.call) {
                 count = call_count(queries[i])->count + 1;
@@ -189,10 +185,9 @@ TEST(test_unknown_memory)
     Compute compute;
     Answer answer;
     assert_false(work(&compute, &answer));
-    char *text = compute_failure_text(&compute);
+    OWNED char *text = compute_failure_text(&compute);
     assert_non_null(strstr(text, "the device does not report its memory"));
     assert_null(strstr(text, "the device has 0"));
-    free(text);
     compute_close_checked(&compute);
     injected.call = NULL;
     work_device = known;

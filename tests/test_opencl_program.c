@@ -120,11 +120,10 @@ static ProgramRequest triple_request(void)
 
 static void drivers_own_cache_empty(void)
 {
-    char *empty = NULL;
+    OWNED char *empty = NULL;
     assert_true(asprintf(&empty, "%s/driver-XXXXXX", scratch) > 0);
     assert_non_null(mkdtemp(empty));
     setenv("POCL_CACHE_DIR", empty, 1);
-    free(empty);
 }
 
 TEST_WITH(second_build_is_loaded_from_the_cache, scratch_set_up, scratch_tear_down)
@@ -150,12 +149,11 @@ TEST_WITH(key_depends_on_every_input, scratch_set_up, scratch_tear_down)
     assert_true(run_in_child(request).from_cache);
     request.launch = "triple 16";
     assert_false(run_in_child(request).from_cache);
-    char *other = NULL;
+    OWNED char *other = NULL;
     assert_true(asprintf(&other, "%s\n", triple) > 0);
     request = triple_request();
     request.prelude = other;
     assert_false(run_in_child(request).from_cache);
-    free(other);
 }
 
 TEST_WITH(no_cache_builds_each_time, scratch_set_up, scratch_tear_down)
@@ -199,7 +197,7 @@ TEST_WITH(damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
-    Text entry = the_entry(&key);
+    OwnedText entry = the_entry(&key);
     FILE *file = fopen(entry_path_found, "r+b");
     assert_non_null(file);
     assert_int_equal(fseek(file, -1, SEEK_END), 0);
@@ -210,7 +208,6 @@ TEST_WITH(damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
     assert_true(run_in_child(triple_request()).from_cache);
     free(entry_path_found);
     free(key);
-    text_free(&entry);
 }
 
 // A whole entry whose binary the driver cannot use.
@@ -218,7 +215,9 @@ TEST_WITH(refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
-    Text entry = the_entry(&key), nonsense = {0};
+    OwnedText nonsense = {0};
+    Text entry = the_entry(&key);
+    text_free(&entry);
     assert_string_equal(key + strlen(key) - strlen("#endif\n"), "#endif\n");
     text_appendf(&nonsense, "no binary of any driver");
     cache_store(key, &nonsense, NULL);
@@ -226,8 +225,6 @@ TEST_WITH(refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
     assert_true(run_in_child(triple_request()).from_cache);
     free(entry_path_found);
     free(key);
-    text_free(&entry);
-    text_free(&nonsense);
 }
 
 static void warning_keep(void *context, MessageList *warnings)
@@ -306,9 +303,8 @@ TEST_WITH(compile_error_names_its_place_and_the_saved_text, scratch_set_up, scra
     char *saved = strstr(end.errors, scratch);
     assert_non_null(saved);
     saved[strcspn(saved, "\n")] = '\0';
-    Text text = file_text(saved);
+    OwnedText text = file_text(saved);
     assert_non_null(strstr(text_c(&text), "#line 1 \"features.h\""));
-    text_free(&text);
 }
 
 TEST_WITH(missing_root_is_named, scratch_set_up, scratch_tear_down)
@@ -335,7 +331,7 @@ static void build_broken(void *result)
 {
     Opened opened;
     opened_open(&opened, NULL);
-    char *text = kernel_compose(broken_files, "root.cl", "");
+    OWNED char *text = kernel_compose(broken_files, "root.cl", "");
     cl_int status;
     cl_program program =
         clCreateProgramWithSource(opened.compute.context, 1, (const char *[]){text}, NULL, &status);
@@ -345,7 +341,6 @@ static void build_broken(void *result)
     char log[4096] = "";
     clGetProgramBuildInfo(program, id, CL_PROGRAM_BUILD_LOG, sizeof log, log, NULL);
     memcpy(((BuildLog *)result)->log, log, sizeof log);
-    free(text);
     clReleaseProgram(program);
     opened_close(&opened);
 }

@@ -36,10 +36,10 @@ static bool take(void *context, const Film *band)
 
 TEST(passes_give_the_bits_of_one_render)
 {
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.sample_count = SAMPLES;
-    Film expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOVS);
     settings.band_rows = 8;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
@@ -52,9 +52,7 @@ TEST(passes_give_the_bits_of_one_render)
     assert_true(taken.color_bands >= 10 && taken.color_bands % 5 == 0);
     film_assert_same(&taken.film, &expected, "passes");
     film_free(&taken.film);
-    film_free(&expected);
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 static unsigned stop_countdown;
@@ -67,7 +65,7 @@ static bool stop_now(void *context)
 
 TEST(passes_stop)
 {
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.sample_count = SAMPLES;
     settings.band_rows = 8;
@@ -84,12 +82,11 @@ TEST(passes_stop)
         film_free(&taken.film);
     }
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 static void check_moved_renderer(bool moves)
 {
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.moves = moves;
     settings.bvh = BVH_ON;
@@ -106,7 +103,7 @@ static void check_moved_renderer(bool moves)
     assert_true(renderer_move(renderer, &scene, &settings, &messages));
     assert_true(renderer_render_film(renderer, AOVS, &film));
     assert_true(renderer_report(renderer)->build_seconds == build_seconds);
-    Film expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOVS);
     film_assert_same(&film, &expected, "moved");
     film_free(&film);
 
@@ -125,9 +122,7 @@ static void check_moved_renderer(bool moves)
     assert_true(renderer_render_film(renderer, AOVS, &film));
     film_assert_same(&film, &expected, "back from a camera that does not fit");
     film_free(&film);
-    film_free(&expected);
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 // At `certified`, a scene that does not fit the device in double must not replace the scene in float.
@@ -137,24 +132,20 @@ TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
     Device small = *probe_compute.device;
     Compute compute = probe_compute;
     compute.device = &small;
-    Scene scene = scene_of_file("scenes/spheres16.yaml");
+    OwnedScene scene = scene_of_file("scenes/spheres16.yaml");
     const RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(&compute, &scene, &settings, &messages);
-    Film film, expected = film_render(&compute, &scene, &settings, AOVS);
+    OwnedFilm film, expected = film_render(&compute, &scene, &settings, AOVS);
     small.memory_bytes = 1 << 28;
     while (renderer_move(renderer, &scene, &settings, &messages))
         small.memory_bytes -= small.memory_bytes / 16; // in double the scene needs more
     scene.camera.position.x += 1;
     assert_false(renderer_move(renderer, &scene, &settings, &messages));
     small.memory_bytes = probe_compute.device->memory_bytes;
-    message_list_free(&messages);
     assert_true(renderer_render_film(renderer, AOVS, &film));
     film_assert_same(&film, &expected, "after a scene that does not fit");
-    film_free(&film);
-    film_free(&expected);
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 TEST(moved_renderer_gives_the_bits_of_a_new_one)
@@ -217,10 +208,11 @@ TEST(preview_differs_by_roundings)
 // two places builds each kernel once.
 TEST(eye_next_to_a_sphere_builds_two_kernels)
 {
-    Scene scene = scene_of_text("two.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
-                                            "lights: [{point: {position: [0, 9, -9]}}]\n"
-                                            "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125,\n"
-                                            "  material: {reflection: 0.1}}}]\n"); // as glint.py's SPHERE
+    OwnedScene scene =
+        scene_of_text("two.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
+                                  "lights: [{point: {position: [0, 9, -9]}}]\n"
+                                  "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125,\n"
+                                  "  material: {reflection: 0.1}}}]\n"); // as glint.py's SPHERE
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.extra_features = 0;
     settings.moves = true;
@@ -231,11 +223,9 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
     for (size_t i = 0; i < 4; i++) {
         scene.camera.position.z = i % 2 ? 0.3749 : -4;
         assert_true(renderer_move(renderer, &scene, &settings, &messages));
-        Film film, expected = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm film, expected = film_render(&probe_compute, &scene, &settings, 0);
         assert_true(renderer_render_film(renderer, 0, &film));
         film_assert_same(&film, &expected, "near or far");
-        film_free(&film);
-        film_free(&expected);
         hashes[i] = renderer_report(renderer)->kernel_hash;
         build_seconds[i] = renderer_report(renderer)->build_seconds;
     }
@@ -243,7 +233,6 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
     assert_true(hashes[2] == hashes[0] && hashes[3] == hashes[1]);
     assert_true(build_seconds[1] > build_seconds[0] && build_seconds[3] == build_seconds[1]);
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -27,16 +27,16 @@ static unsigned place_in_cell(const Film *whole, const double *color, uint32_t x
 // Every cell has one, at places that differ, whatever the bands.
 TEST(sample_has_a_pixel_of_each_cell)
 {
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_sound_from());
     settings.sample_count = 2;
-    Film whole = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm whole = film_render(&probe_compute, &scene, &settings, 0);
     settings.cell = CELL;
     settings.region_width = WIDTH / CELL;
     settings.region_height = HEIGHT / CELL;
-    Film sample = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm sample = film_render(&probe_compute, &scene, &settings, 0);
     settings.band_rows = 4;
-    Film in_bands = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm in_bands = film_render(&probe_compute, &scene, &settings, 0);
     film_assert_same(&in_bands, &sample, "a sample in bands");
     unsigned counts[CELL * CELL] = {0};
     for (uint32_t y = 0; y < sample.height; y++)
@@ -44,10 +44,6 @@ TEST(sample_has_a_pixel_of_each_cell)
             counts[place_in_cell(&whole, sample.color + 3 * ((size_t)y * sample.width + x), x, y)]++;
     for (unsigned i = 0; i < CELL * CELL; i++)
         assert_true(counts[i] <= 24); // of 140; the background's first counts for all
-    film_free(&whole);
-    film_free(&sample);
-    film_free(&in_bands);
-    scene_free(&scene);
 }
 
 TEST(bound_of_zeros_and_ones)
@@ -104,7 +100,7 @@ TEST(verdicts_of_a_sample)
     for (size_t i = 0; i < 3 * COUNT; i++)
         wrong[i] = colors[i] = (double)(i % 5) / 2; // 0 to 2
     const double floor_of_none = sqrt(pow(0.05, -1.0 / COUNT) - 1);
-    Film reference = film_of(colors, COUNT), equal = film_of(wrong, COUNT);
+    OwnedFilm reference = film_of(colors, COUNT), equal = film_of(wrong, COUNT);
     ErrorBudget budget = {0.2, ERROR_RMSE};
     Sampling sampling = {.drawn = COUNT, .drawn_share = 1, .color_max = 3, .risk = 0.05};
     assert_true(fabs(sample_rmse_floor(&sampling) - 3 * floor_of_none) < 1e-9);
@@ -117,7 +113,7 @@ TEST(verdicts_of_a_sample)
     verdict = sample_classify(&budget, &reference, &equal, &sampling);
     assert_true(verdict.keeps && fabs(verdict.bound - floor_of_none * floor_of_none) < 1e-9);
     wrong[0] += 0.5;
-    Film off = film_of(wrong, COUNT);
+    OwnedFilm off = film_of(wrong, COUNT);
     verdict = sample_classify(&budget, &reference, &off, &sampling);
     assert_true(!verdict.keeps && verdict.error == 0.5 && verdict.bound > 2 * floor_of_none * floor_of_none);
     budget = (ErrorBudget){0.5, ERROR_FLIP};
@@ -125,7 +121,7 @@ TEST(verdicts_of_a_sample)
     assert_true(verdict.keeps && verdict.error > 0 && verdict.error < 1e-3 && verdict.bound > 0.07);
 
     // pixels outside the sample count in full: an error of 0.5 in a channel of the only one
-    Film turned = film_of(wrong + 3, COUNT - 1), turned_reference = film_of(colors + 3, COUNT - 1);
+    OwnedFilm turned = film_of(wrong + 3, COUNT - 1), turned_reference = film_of(colors + 3, COUNT - 1);
     const Sampling most = {.drawn = COUNT - 1, .drawn_share = 0.999, .color_max = 3, .risk = 0.05};
     const double drawn_bound =
         sample_classify(&(ErrorBudget){1, ERROR_RMSE}, &turned_reference, &turned, &most).bound;
@@ -144,11 +140,6 @@ TEST(verdicts_of_a_sample)
     sampling.color_max = INFINITY;
     assert_false(sample_classify(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &equal, &sampling).keeps);
     assert_true(sample_classify(&(ErrorBudget){10, ERROR_MAX}, &reference, &equal, &sampling).keeps);
-    film_free(&reference);
-    film_free(&equal);
-    film_free(&off);
-    film_free(&turned);
-    film_free(&turned_reference);
 }
 
 // Calculated by hand, per channel: the larger square, in all lights, and half of that in each of two mirrors.
@@ -165,24 +156,22 @@ TEST(scene_bounds_its_colors)
         "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {checker: {colors: [[1, 0, 0], [0.5, 0, "
         "0.5]], size: 1},\n"
         "            specular: 100, diffuse: 0.5, reflection: 0.3, transmission: 0.2, shininess: 1.0e15}}\n";
-    Scene scene = scene_of_text("a.yaml", text);
+    OwnedScene scene = scene_of_text("a.yaml", text);
     const double red = 0.1 + 3 * (0.5 + 100), blue = 0.05 + 2 * (0.25 + 100);
     for (uint32_t bounces = 0; bounces < 3; bounces++) {
         const CompileSettings settings = {
             .width = 9, .height = 9, .sample_count = 1, .lanes = 4, .bounce_count = bounces};
-        CompiledScene compiled = scene_compiled(&scene, &settings);
+        OwnedCompiledScene compiled = scene_compiled(&scene, &settings);
         const double halves = 2 - pow(0.5, bounces), largest = scene_color_max(&compiled, &scene, bounces);
         assert_true(blue < red && fabs(largest / (1.01 * red * halves) - 1) < 1e-12);
-        compiled_scene_free(&compiled);
     }
-    scene_free(&scene);
 }
 
 // No sample this small proves an RMSE of 1e-6, and every precision keeps one of a thousand.
 TEST(pilot_chooses)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     MessageList messages = {0};
     Pilot pilot;
@@ -220,7 +209,6 @@ TEST(pilot_chooses)
     assert_int_equal(pilot.candidates[PRECISION_SINGLE].status, PILOT_UNTRIED);
     assert_true(pilot.color_max > 1000);
     assert_int_equal(messages.count, 0);
-    scene_free(&scene);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -58,15 +58,13 @@ static const struct {
 
 static void check_lines(size_t i, const char *line_end)
 {
-    Text text = {0};
+    OwnedText text = {0};
     for (const char *at = cases[i].text; *at; at++)
         text_append(&text, *at == '\n' ? line_end : at, *at == '\n' ? strlen(line_end) : 1);
-    Scene scene = scene_of_text(cases[i].name, text_c(&text));
+    OwnedScene scene = scene_of_text(cases[i].name, text_c(&text));
     assert_int_equal(scene.objects.count, OBJECTS_MAX);
     for (size_t k = 0; k < OBJECTS_MAX; k++)
         assert_int_equal(scene.objects.items[k].line, cases[i].lines[k]);
-    scene_free(&scene);
-    text_free(&text);
 }
 
 // Line ends of Unix, Windows and old Macs.
@@ -81,21 +79,20 @@ TEST(test_lines)
 
 static void assert_described(const Scene *scene, size_t id, const char *expected)
 {
-    Text text = {0};
+    OwnedText text = {0};
     object_describe(&text, scene, "folder/a.yaml", id);
     assert_string_equal(text_c(&text), expected);
-    text_free(&text);
 }
 
 TEST(test_descriptions)
 {
-    Scene scene = scene_of_text("a.yaml", "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
-                                          "lights: [{point: {position: [3, 5, 4]}}]\n"
-                                          "materials: {red: {color: [1, 0, 0]}}\n"
-                                          "objects:\n"
-                                          "  - sphere: {center: [0, 0, 0], radius: 1, material: red}\n"
-                                          "  - mesh: {file: scenes/meshes/bunny.obj}\n"
-                                          "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
+    OwnedScene scene = scene_of_text("a.yaml", "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
+                                               "lights: [{point: {position: [3, 5, 4]}}]\n"
+                                               "materials: {red: {color: [1, 0, 0]}}\n"
+                                               "objects:\n"
+                                               "  - sphere: {center: [0, 0, 0], radius: 1, material: red}\n"
+                                               "  - mesh: {file: scenes/meshes/bunny.obj}\n"
+                                               "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
     const size_t triangles = scene.meshes.items[0].triangle_count;
     assert_described(&scene, 0, "sphere 0, a.yaml:5, material red");
     assert_described(&scene, 3, "triangle 2 of mesh 1, bunny.obj, a.yaml:6");
@@ -104,7 +101,6 @@ TEST(test_descriptions)
     assert_described(&scene, triangles + 1, plane);
     assert_described(&scene, triangles + 2, "nothing");
     assert_described(&scene, UINT32_MAX, "nothing");
-    scene_free(&scene);
 }
 
 TEST_MAIN(NULL, NULL)

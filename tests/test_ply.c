@@ -28,7 +28,7 @@ static const uint32_t triangles[2][3] = {{0, 1, 2}, {1, 3, 2}};
 static void assert_square(const Text *text)
 {
     file_write_bytes("a.ply", text->items, text->count);
-    Scene scene = scene_of_text("scene.yaml", SCENE);
+    OwnedScene scene = scene_of_text("scene.yaml", SCENE);
     assert_int_equal(scene.meshes.count, 1);
     const Mesh *mesh = &scene.meshes.items[0];
     assert_int_equal(mesh->triangle_count, 2);
@@ -37,7 +37,6 @@ static void assert_square(const Text *text)
         Vector3 vertex = mesh->vertices[mesh->triangles[i / 3][i % 3]];
         assert_vector(vertex, corner[0], corner[1], corner[2]);
     }
-    scene_free(&scene);
 }
 
 // Expects one message about a.ply.
@@ -72,9 +71,8 @@ TEST(ascii_layouts_are_read)
     };
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
-            Text text = text_with_line_ends(texts[i], ends);
+            OwnedText text = text_with_line_ends(texts[i], ends);
             assert_square(&text);
-            text_free(&text);
         }
     }
 }
@@ -141,9 +139,8 @@ TEST(binary_layouts_are_read)
     for (size_t i = 0; i < COUNT_OF(types); i++) {
         for (int big = 0; big < 2; big++) {
             for (int returns = 0; returns < 2; returns++) {
-                Text text = binary_square(&types[i], big, returns ? "\r\n" : "\n");
+                OwnedText text = binary_square(&types[i], big, returns ? "\r\n" : "\n");
                 assert_square(&text);
-                text_free(&text);
             }
         }
     }
@@ -235,27 +232,24 @@ TEST(binary_faults_name_byte_and_row)
                  {2, 1e300, 7, "1e+300"}};
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         const Type *type = &types[cases[i].type];
-        Text text = binary_with_count(headers[cases[i].header], cases[i].count, type);
+        OwnedText text = binary_with_count(headers[cases[i].header], cases[i].count, type);
         file_write_bytes("a.ply", text.items, text.count);
         assert_refused(formatted("4:18: error: a.ply: byte %zu: face 1 (from 0) declares %s numbers of "
                                  "'vertex_indices', the file has 3 more",
                                  text.count - type->size - 12, cases[i].promise));
-        text_free(&text);
     }
 }
 
 // A file truncated anywhere is rejected with the position.
 TEST(binary_file_cut_short_is_refused)
 {
-    Text whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
+    OwnedText whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
     assert_square(&whole);
     for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
         file_write_bytes("a.ply", whole.items, size);
-        Text messages = scene_messages("scene.yaml", SCENE, false);
+        OwnedText messages = scene_messages("scene.yaml", SCENE, false);
         assert_non_null(strstr(text_c(&messages), "4:18: error: a.ply: byte "));
-        text_free(&messages);
     }
-    text_free(&whole);
 }
 
 static Scene scene_of_ply(const char *ply, const char *expected)
@@ -314,11 +308,10 @@ TEST(what_is_not_used_is_reported)
                          "14:9: warning: words after the last property of a row are not used\n"
                          "18:2: warning: lines after the last element are not used\n");
     scene_free(&scene);
-    Text bytes = binary_with_count(BINARY("uchar"), 3, &types[1]);
+    OwnedText bytes = binary_with_count(BINARY("uchar"), 3, &types[1]);
     text_append(&bytes, "\n", 1);
     file_write_bytes("a.ply", bytes.items, bytes.count);
     assert_messages("scene.yaml", SCENE, "4:18: warning: a.ply: 1 byte after the last element is not used\n");
-    text_free(&bytes);
 }
 
 TEST(vertices_without_a_coordinate_are_refused)

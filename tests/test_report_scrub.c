@@ -32,12 +32,10 @@ TEST(texts_are_scrubbed)
     setenv("LOGNAME", "annuser", true);
     Scrubber scrubber = scrubber_open("/srv/here");
     for (size_t i = 0; i < COUNT_OF(rows); i++) {
-        Text text = {0};
+        OwnedText text = {0};
         text_append(&text, rows[i].text, strlen(rows[i].text));
-        Text scrubbed = scrub(&scrubber, &text);
+        OwnedText scrubbed = scrub(&scrubber, &text);
         assert_string_equal(text_c(&scrubbed), rows[i].scrubbed);
-        text_free(&scrubbed);
-        text_free(&text);
     }
     scrubber_close(&scrubber);
 }
@@ -48,14 +46,11 @@ TEST(host_is_scrubbed)
     assert_int_equal(uname(&host), 0);
     if (strlen(host.nodename) < 2 || strcmp(host.nodename, "localhost") == 0) skip();
     Scrubber scrubber = scrubber_open("/srv/here");
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, "\"name\": \"%s\", 3.1+%s", host.nodename, host.nodename);
-    Text scrubbed = scrub(&scrubber, &text);
-    char *expected = text_format("\"name\": \"HOST\", 3.1+%s", host.nodename);
+    OwnedText scrubbed = scrub(&scrubber, &text);
+    OWNED char *expected = text_format("\"name\": \"HOST\", 3.1+%s", host.nodename);
     assert_string_equal(text_c(&scrubbed), expected);
-    free(expected);
-    text_free(&scrubbed);
-    text_free(&text);
     scrubber_close(&scrubber);
 }
 

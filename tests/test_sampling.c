@@ -92,14 +92,12 @@ TEST(points_are_nets)
 TEST(precisions_agree)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    Points *strict = points_make(false, 17, 4, 3), *exact = points_make(true, 17, 4, 3);
+    OWNED Points *strict = points_make(false, 17, 4, 3), *exact = points_make(true, 17, 4, 3);
     assert_memory_equal(strict->square, exact->square, sizeof strict->square);
     for (size_t i = 0; i < COUNT; i++) {
         assert_true(fabs((double)strict->disc[i].x - exact->disc[i].x) < 4e-7);
         assert_true(fabs((double)strict->disc[i].y - exact->disc[i].y) < 4e-7);
     }
-    free(strict);
-    free(exact);
 }
 
 // Equal parts of the square are equal parts of the disc, so that rings and quarters have as many points as
@@ -107,7 +105,7 @@ TEST(precisions_agree)
 TEST(disc_is_uniform)
 {
     enum { RINGS = 16 };
-    Points *points = points_make(false, 5, 6, 1);
+    OWNED Points *points = points_make(false, 5, 6, 1);
     size_t rings[RINGS] = {0}, quarters[4] = {0};
     for (size_t i = 0; i < COUNT; i++) {
         const double x = points->disc[i].x, y = points->disc[i].y, squared = x * x + y * y;
@@ -122,7 +120,6 @@ TEST(disc_is_uniform)
         assert_true(fabs((double)rings[i] - (double)COUNT / RINGS) <= 16);
     for (size_t i = 0; i < 4; i++)
         assert_true(fabs((double)quarters[i] - COUNT / 4.0) <= 16);
-    free(points);
 }
 
 TEST_MAIN(probe_open, probe_close)

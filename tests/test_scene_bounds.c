@@ -9,11 +9,10 @@
 
 static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)
 {
-    Scene scene = scene_of_text("s.yaml", formatted(CAMERA "%s", objects));
+    OwnedScene scene = scene_of_text("s.yaml", formatted(CAMERA "%s", objects));
     size_t unbounded_count;
     Bounds bounds = scene_bounds(&scene, &unbounded_count);
     assert_int_equal(unbounded_count, expected_unbounded_count);
-    scene_free(&scene);
     return bounds;
 }
 

@@ -102,8 +102,8 @@ static void check_scene(BrokenScene *broken)
 {
     if (broken->is_escaped) text_unescape(&broken->text);
     text_append(&all_expected, text_c(&broken->expected), broken->expected.count);
-    MessageList messages = {0};
-    Text got = {0};
+    OwnedMessageList messages = {0};
+    OwnedText got = {0};
     Scene scene;
     const bool read =
         broken->sets.count > 0
@@ -115,8 +115,6 @@ static void check_scene(BrokenScene *broken)
     if (read || strcmp(text_c(&got), text_c(&broken->expected)) != 0)
         fail_msg("%s:\n%sexpected:\n%s", broken->name, text_c(&got), text_c(&broken->expected));
     assert_null(scene.objects.items);
-    message_list_free(&messages);
-    text_free(&got);
     text_free(&broken->text);
     text_free(&broken->expected);
 }
@@ -126,10 +124,10 @@ static void check_table(void **state)
     const char *ending = *state;
     char path[32];
     snprintf(path, sizeof path, "tests/broken/%s.txt", ending);
-    Text table = file_text(path);
+    OwnedText table = file_text(path);
     size_t count = 0;
     char *line = strstr(table.items, "#### scene ");
-    Text start = {0};
+    OwnedText start = {0};
     text_append(&start, table.items, (size_t)(line - table.items));
     for (; line; count++) {
         BrokenScene broken;
@@ -137,8 +135,6 @@ static void check_table(void **state)
         check_scene(&broken);
     }
     assert_true(count >= BROKEN_SCENES_MIN);
-    text_free(&start);
-    text_free(&table);
 }
 
 TEST_CASE(test_yaml, check_table, "yaml")
@@ -167,19 +163,17 @@ static char *format_core(const char *format, size_t length)
 
 static size_t check_source(const char *path)
 {
-    Text text = file_text(path);
+    OwnedText text = file_text(path);
     size_t count = 0;
     for (const char *at = text_c(&text); (at = strstr(at, "report_error("));) {
         const char *quote = strchr(at, '"'), *end_of_call = strchr(at, ';');
         at += strlen("report_error(");
         if (!quote || quote > end_of_call) continue;
-        char *core = format_core(quote + 1, (size_t)(strchr(quote + 1, '"') - quote - 1));
+        OWNED char *core = format_core(quote + 1, (size_t)(strchr(quote + 1, '"') - quote - 1));
         if (*core && !strstr(text_c(&all_expected), core))
             fail_msg("%s: no broken scene for \"%s\"", path, core);
         count += *core != '\0';
-        free(core);
     }
-    text_free(&text);
     return count;
 }
 
@@ -209,7 +203,7 @@ TEST(test_every_message_has_a_scene)
 
 TEST(test_names)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     SceneOptions options = {0};
     Scene scene;
     assert_false(scene_load(&scene, "tests/scenes/complete.txt", &options, &messages));
@@ -221,7 +215,6 @@ TEST(test_names)
     assert_false(scene_load(&scene, "tests/scenes/absent.yml", &options, &messages));
     assert_non_null(strstr(messages.items[2].text, "absent.yml"));
     assert_int_equal(messages.count, 3);
-    message_list_free(&messages);
 }
 
 TEST_MAIN(NULL, NULL)

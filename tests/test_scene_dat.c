@@ -43,10 +43,9 @@ TEST(test_camera)
     assert_int_equal(camera->field_axis, FIELD_VERTICAL);
     assert_number(camera->half_tangent, 0.25);
     assert_number(camera->frame_aspect, 2);
-    Scene scene = scene_of_text("s.dat", LIT SPHERE);
+    OwnedScene scene = scene_of_text("s.dat", LIT SPHERE);
     assert_number(scene.camera.half_tangent, 0.5);
     assert_number(scene.camera.frame_aspect, 0);
-    scene_free(&scene);
 }
 
 TEST(test_lights)
@@ -87,7 +86,7 @@ TEST(test_materials)
     assert_number(blue->specular.largest, 0.5);
 
     // as VMD has it, what a transparent surface shows is dimmed
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "s.dat",
         LIT "shader_mode full trans_vmd end_shader_mode sphere center 0 0 0 rad 1 texture ambient 0.4 "
             "diffuse 0.8 specular 0 opacity 0.25 phong 1 phong_size 8 color 1 1 1 texfunc 0\n");
@@ -96,7 +95,6 @@ TEST(test_materials)
     assert_vector(dimmed->diffuse, 0.2, 0.2, 0.2);
     assert_number(dimmed->specular.largest, 0.25);
     assert_number(dimmed->transmission.largest, 0.75);
-    scene_free(&scene);
 }
 
 TEST(test_shapes)
@@ -242,29 +240,26 @@ TEST(test_fading)
         "sphere center 0 4 0 rad 1 " TEXTURE
         "light center 3 2 0 rad 0.1 attenuation constant 1 linear 2 quadratic 1 color 1.6 0 0\n";
     assert_messages("s.dat", text, "7:20: warning: lights are not visible themselves\n");
-    Scene scene = scene_of_text("s.dat", text);
+    OwnedScene scene = scene_of_text("s.dat", text);
     assert_vector(scene.lights.items[0].color, 1.6, 0, 0);
     const double *fading = scene.lights.items[0].fading;
     assert_true(fading[0] == 1 && fading[1] == 2 && fading[2] == 1);
-    scene_free(&scene);
 }
 
 TEST(test_frustum)
 {
-    Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("", "frustum -1 2 -3 1 ") SPHERE);
+    OwnedScene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("", "frustum -1 2 -3 1 ") SPHERE);
     assert_number(scene.camera.half_tangent, 2);
     assert_number(scene.camera.frame_aspect, 0.75);
     assert_number(scene.camera.shift[0], 0.125);
     assert_number(scene.camera.shift[1], -0.25);
-    scene_free(&scene);
 }
 
 TEST(test_orthographic)
 {
-    Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("projection orthographic", "") SPHERE);
+    OwnedScene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("projection orthographic", "") SPHERE);
     assert_true(scene.camera.projection == PROJECTION_ORTHOGRAPHIC);
     assert_number(scene.camera.half_tangent, 0.5);
-    scene_free(&scene);
 }
 
 // Colors of Tachyon 0.99, whose rays go through a pixel's upper right corner, where four pixels of the double
@@ -291,18 +286,16 @@ TEST(test_picture)
         {28, 12, {0.088, 0.165, 0.386}}, {22, 22, {0.489, 0.471, 0.406}}, {5, 26, {0.489, 0.471, 0.406}},
         {28, 25, {0.492, 0.474, 0.453}}, {15, 27, {0.492, 0.430, 0.337}}, {17, 26, {0.489, 0.429, 0.336}},
         {24, 18, {0.489, 0.471, 0.406}}};
-    Scene scene = scene_of_text("s.dat", text);
+    OwnedScene scene = scene_of_text("s.dat", text);
     enum { WIDTH = 80, HEIGHT = 60 };
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
     for (size_t i = 0; i < COUNT_OF(pixels); i++) {
         const double *corner = film.color + 3 * ((2 * pixels[i].y - 1) * WIDTH + 2 * pixels[i].x + 1);
         for (size_t k = 0; k < 3; k++)
             assert_near((corner[k] + corner[k + 3] + corner[k + 3 * WIDTH] + corner[k + 3 * WIDTH + 3]) / 4,
                         pixels[i].color[k], 0.02);
     }
-    film_free(&film);
-    scene_free(&scene);
 }
 
 TEST_MAIN(set_up, tear_down)

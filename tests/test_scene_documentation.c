@@ -32,23 +32,20 @@ static void check_examples(void **state)
 {
     const Examples *examples = *state;
     const char *camera_alone = "warning: s.yaml: no objects\nwarning: s.yaml: no lights\n";
-    Text fence = {0};
+    OwnedText fence = {0};
     text_appendf(&fence, "\n```%s\n", examples->language);
     size_t count = 0;
     for (const char *at = text_c(&page); (at = strstr(at, text_c(&fence))); count++) {
         at += fence.count;
         const char *end = strstr(at, "\n```\n");
         assert_non_null(end);
-        Text example = {0};
+        OwnedText example = {0};
         text_append(&example, at, (size_t)(end - at) + 1);
-        Text messages = scene_messages(formatted("s.%s", examples->language), text_c(&example), false);
+        OwnedText messages = scene_messages(formatted("s.%s", examples->language), text_c(&example), false);
         if (messages.count && strcmp(text_c(&messages), camera_alone) != 0)
             fail_msg("%s%s", text_c(&example), text_c(&messages));
-        text_free(&messages);
-        text_free(&example);
     }
     assert_true(count >= examples->count_min && count <= 100);
-    text_free(&fence);
 }
 
 TEST_CASE(yaml_examples_are_read, check_examples, &(Examples){"yaml", 2})
@@ -87,12 +84,11 @@ TEST(names_of_colors_are_those_of_css)
     for (size_t i = 0; i < COUNT_OF(colors); i++) {
         const char *named = strstr(names, formatted("`%s`", colors[i].name));
         assert_true(named && named < end);
-        Scene scene = scene_of_text(
+        OwnedScene scene = scene_of_text(
             "s.yaml",
             formatted("camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nambient: %s\nbackground: '#%s'\n",
                       colors[i].name, colors[i].hex));
         assert_memory_equal(&scene.ambient, &scene.background, sizeof scene.ambient);
-        scene_free(&scene);
     }
 }
 

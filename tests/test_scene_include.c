@@ -35,7 +35,7 @@ static Scene scene_set(const char *path, const char *const *overrides, size_t co
 
 static void check_messages(const char *path, const char *const *overrides, size_t count, const char *expected)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     const SceneOptions options = {.overrides = overrides, .override_count = count, .override_name = "--set"};
     assert_false(scene_load(&scene, path, &options, &messages));
@@ -43,10 +43,8 @@ static void check_messages(const char *path, const char *const *overrides, size_
         free(messages.items[i].source_line);
         messages.items[i].source_line = NULL;
     }
-    char *text = message_list_text(&messages);
+    OWNED char *text = message_list_text(&messages);
     assert_string_equal(text, expected);
-    free(text);
-    message_list_free(&messages);
 }
 
 // Writes the files of a scene in two folders, one of which includes another.
@@ -83,7 +81,7 @@ static void write_forest(const char *scene)
 TEST(included_files_are_joined)
 {
     write_forest(FOREST);
-    Scene scene = scene_set("forest.yaml", NULL, 0);
+    OwnedScene scene = scene_set("forest.yaml", NULL, 0);
     assert_vector(scene.camera.position, 0, 0, 9); // the first one
     assert_vector(scene.background, 0, 0, 1);
     assert_vector(scene.ambient, 0.25, 0.25, 0.25);
@@ -106,26 +104,23 @@ TEST(included_files_are_joined)
         const Object *object = &scene.objects.items[i];
         assert_int_equal(object->type, expected[i].type);
         assert_string_equal(scene.material_names.items[object->material], expected[i].material);
-        Text description = {0};
+        OwnedText description = {0};
         object_describe(&description, &scene, "forest.yaml", i);
         assert_string_equal(text_c(&description), expected[i].description);
-        text_free(&description);
     }
     assert_int_equal(scene.materials.count, 4); // with that of the last mesh
     assert_int_equal(scene.included.count, 3);
     assert_true(scene_was_read_from(&scene, "forest.yaml", "parts/../parts/colors.yaml"));
     assert_false(scene_was_read_from(&scene, "ground.yaml", "lost.yaml"));
-    scene_free(&scene);
 }
 
 TEST(scene_overrides_included_files)
 {
     write_forest("include: ground.yaml\nmaterials: {green: {}}\nbackground: 0\n" CAMERA LIGHTS);
-    Scene scene = scene_set("forest.yaml", NULL, 0);
+    OwnedScene scene = scene_set("forest.yaml", NULL, 0);
     assert_vector(scene.camera.position, 0, 0, -5);
     assert_vector(scene.background, 0, 0, 0);
     assert_int_equal(scene.objects.count, 1);
-    scene_free(&scene);
 }
 
 // A scene's animation values take precedence, then those of the first included file.
@@ -134,24 +129,20 @@ TEST(scene_overrides_included_animation)
     file_write("timing.yaml", "frames: 8\nfps: 30\nshutter: 0.5\n");
     file_write("other.yaml", "frames: 9\nfps: 31\nshutter: 0.25\n");
     write_forest("include: [parts/trees.yaml, timing.yaml, other.yaml]\nfps: 12\n");
-    Scene scene = scene_set("forest.yaml", NULL, 0);
+    OwnedScene scene = scene_set("forest.yaml", NULL, 0);
     assert_int_equal(scene.animation.frame_count, 8);
     assert_number(scene.animation.frame_rate, 12);
     assert_number(scene.animation.shutter, 0.5);
-    scene_free(&scene);
 }
 
 TEST(hash_covers_included_files)
 {
     write_forest(FOREST);
-    Scene scene = scene_set("forest.yaml", NULL, 0), same = scene_set("forest.yaml", NULL, 0);
+    OwnedScene scene = scene_set("forest.yaml", NULL, 0), same = scene_set("forest.yaml", NULL, 0);
     file_write("parts/colors.yaml", "materials:\n  green: {color: [0, 0.5, 0]}\n");
-    Scene other = scene_set("forest.yaml", NULL, 0);
+    OwnedScene other = scene_set("forest.yaml", NULL, 0);
     assert_true(scene.text_hash == same.text_hash);
     assert_true(scene.text_hash != other.text_hash);
-    scene_free(&scene);
-    scene_free(&same);
-    scene_free(&other);
 }
 
 // Values that an alias repeats in an included file are joined under only one of its names.
@@ -165,11 +156,10 @@ TEST(aliases_in_included_files_are_joined_once)
     file_write("scene.yaml", "include: [alias.yaml, more.yaml]\n" CAMERA LIGHTS
                              "objects: [instance: {of: two}, instance: {of: one}]\n");
     static const double radii[] = {1, 2, 3, 1, 2, 3};
-    Scene scene = scene_set("scene.yaml", NULL, 0);
+    OwnedScene scene = scene_set("scene.yaml", NULL, 0);
     assert_int_equal(scene.objects.count, 6);
     for (size_t i = 0; i < 6; i++)
         assert_number(scene.objects.items[i].as.sphere.radius, radii[i]);
-    scene_free(&scene);
 }
 
 TEST(set_changes_included_values)
@@ -177,12 +167,11 @@ TEST(set_changes_included_values)
     write_forest(FOREST);
     static const char *const overrides[] = {"objects[2].plane.point=[0, 4, 0]", "materials.green.color=blue",
                                             "objects[5]=mesh: {file: triangle.obj}"};
-    Scene scene = scene_set("forest.yaml", overrides, 3);
+    OwnedScene scene = scene_set("forest.yaml", overrides, 3);
     assert_int_equal(scene.objects.count, 7);
     assert_vector(scene.objects.items[2].as.plane.point, 0, 4, 0);
     assert_int_equal(scene.objects.items[6].line, 0);
     assert_vector(scene.materials.items[0].color, 0, 0, 1);
-    scene_free(&scene);
     check_messages("forest.yaml", (const char *[]){"ambient=1", "include=ground.yaml", "ambient=x"}, 3,
                    "--set:1:9: error: 'ambient' must be a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red, "
                    "not 'x'\n--set:1:9: error: 'include' cannot be set: files are included before values are "
@@ -198,15 +187,13 @@ TEST(every_included_file_is_named)
 {
     write_forest(FOREST);
     file_write("ground.yaml", "objects: [\n");
-    Text names = {0};
-    MessageList messages = {0};
+    OwnedText names = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     const SceneOptions options = {.file_named = name_append, .context = &names};
     assert_false(scene_load(&scene, "forest.yaml", &options, &messages));
     assert_string_equal(text_c(&names),
                         "parts/trees.yaml\nparts/colors.yaml\nground.yaml\nparts/colors.yaml\n");
-    message_list_free(&messages);
-    text_free(&names);
 }
 
 TEST(names_given_twice_are_refused)
@@ -265,7 +252,7 @@ TEST(recursive_includes_are_refused)
 
 TEST(number_of_included_files_is_limited)
 {
-    Text list = {0};
+    OwnedText list = {0};
     for (int i = 0; i < 100; i++) {
         char name[32];
         snprintf(name, sizeof name, "%d.yaml", i);
@@ -300,7 +287,6 @@ TEST(number_of_included_files_is_limited)
              strlen("include: [unreadable.yaml, ") + list.count + 1 - strlen("99.yaml, "));
     check_messages("scene.yaml", NULL, 0, both);
     text_free(&scene);
-    text_free(&list);
 }
 
 TEST_MAIN(set_up, folder_close)

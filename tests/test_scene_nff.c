@@ -148,7 +148,7 @@ TEST(test_tolerated)
 static void check_sides(const char *shape, double reach, bool only_inside)
 {
     const TraceRay rays[] = {{{0, 0, -5}, {0, 0, 1}, 0, INFINITY}, {{0, 0, 0}, {0, 0, 1}, 0, INFINITY}};
-    Scene scene = scene_of_text("s.nff", formatted(LIT MATERIAL "%s\n", shape));
+    OwnedScene scene = scene_of_text("s.nff", formatted(LIT MATERIAL "%s\n", shape));
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         TraceHit hits[2] = {0};
@@ -158,7 +158,6 @@ static void check_sides(const char *shape, double reach, bool only_inside)
         assert_int_equal(hits[1].object, 0);
         assert_true(fabs(hits[1].t - reach) < 1e-6);
     }
-    scene_free(&scene);
 }
 
 // Rays along the z axis, from outside and from inside. What is seen only from inside is hit at its far side

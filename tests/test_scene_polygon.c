@@ -61,7 +61,7 @@ static void check_cut(const Outline *outline)
 {
     assert_int_equal(polygon_triangulate(outline->items, outline->count, &triangles), POLYGON_CUT);
     double area = 0, low_x = INFINITY, low_y = INFINITY, high_x = -INFINITY, high_y = -INFINITY;
-    bool *used = memory_allocate_zeroed(outline->count, sizeof *used);
+    OWNED bool *used = memory_allocate_zeroed(outline->count, sizeof *used);
     for (size_t i = 0; i < triangles.count; i++) {
         const uint32_t *t = triangles.items[i];
         double twice = cross_at(outline->items[t[0]], outline->items[t[1]], outline->items[t[2]]);
@@ -77,7 +77,6 @@ static void check_cut(const Outline *outline)
         high_x = fmax(high_x, outline->items[i].x);
         high_y = fmax(high_y, outline->items[i].y);
     }
-    free(used);
     assert_int_equal(triangles.count, outline->count - 2);
     assert_true(fabs(area - outline_area(outline)) <= 1e-12 * area);
     for (size_t i = 0; i < 300; i++) {

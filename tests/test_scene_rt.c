@@ -98,12 +98,11 @@ TEST(test_square_and_triangle)
 
 TEST(test_square_on_the_floor)
 {
-    Scene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
+    OwnedScene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
     size_t unbounded_count;
     Bounds bounds = scene_bounds(&scene, &unbounded_count);
     assert_vector(bounds.min, -1, 0, -1);
     assert_vector(bounds.max, 1, 0, 1);
-    scene_free(&scene);
 }
 
 TEST(test_blanks_comments_and_line_ends)
@@ -116,10 +115,9 @@ TEST(test_blanks_comments_and_line_ends)
 TEST(test_missing_parts_are_fine)
 {
     assert_messages("s.rt", CAMERA, "warning: s.rt: no objects\nwarning: s.rt: no lights\n");
-    Scene scene = scene_of_text("s.rt", CAMERA);
+    OwnedScene scene = scene_of_text("s.rt", CAMERA);
     assert_vector(scene.ambient, 0, 0, 0);
     assert_int_equal(scene.width, 0);
-    scene_free(&scene);
 }
 
 TEST(test_axes_are_made_unit)
@@ -127,54 +125,49 @@ TEST(test_axes_are_made_unit)
     assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
                     "3:10: warning: 'normal' is not a unit vector; normalized\n");
     assert_messages("s.rt", LIT "pl 0,0,0 0.577,0.577,0.577 255,0,0\n", "");
-    Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,0.5,0 1 4 255,0,0\n");
+    OwnedScene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,0.5,0 1 4 255,0,0\n");
     assert_vector(scene.objects.items[0].as.cylinder.from, 0, -2, 0);
     assert_vector(scene.objects.items[0].as.cylinder.axis, 0, 4, 0);
-    scene_free(&scene);
 }
 
 TEST(test_zero_camera_direction)
 {
     assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
                     "1:12: warning: 'direction' is zero; the camera looks along +z\n");
-    Scene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
+    OwnedScene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
     assert_vector(scene.camera.look_at, 0, 0, 1);
-    scene_free(&scene);
 }
 
 TEST(test_far_camera_keeps_its_direction)
 {
-    Scene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
+    OwnedScene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
     assert_true(scene.camera.look_at.z > 0);
-    scene_free(&scene);
 }
 
 TEST(test_color_before_sizes)
 {
     assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
                     "3:16: warning: the color stands before the sizes\n");
-    Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
+    OwnedScene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
     assert_number(scene.objects.items[0].as.cylinder.radius, 1);
     assert_vector(scene.materials.items[0].color, 1, 0, 0);
     assert_number(scene.materials.items[0].specular.largest, 0.5);
-    scene_free(&scene);
 }
 
 TEST(test_first_of_several_old_cameras)
 {
     assert_messages("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\nL 0,9,0 1\n" SPHERE,
                     "2:1: warning: only the first camera is used\n");
-    Scene scene = scene_of_text("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\n");
+    OwnedScene scene = scene_of_text("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\n");
     assert_vector(scene.camera.position, 0, 0, 0);
-    scene_free(&scene);
 }
 
 TEST(test_lenient_skips_what_it_does_not_know)
 {
-    Text messages = scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
+    OwnedText messages =
+        scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
     assert_string_equal(text_c(&messages), "3:1: warning: skipped unknown element 'ma:steel'\n"
                                            "4:27: warning: skipped 'tex:earth.xpm'\n");
-    text_free(&messages);
 }
 
 // Blanks next to commas, a brightness above 1, checkers and the names of textures.
@@ -183,52 +176,45 @@ TEST(test_lenient_reads_dialects)
     const char *const text = "A 0.2 255, 255,255\nC 0 ,0, -5 0,0 , 1 60\nL 1,2,\t3 1.5 255,0,0\n"
                              "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
                              "cy 0,0,0 0,1,0 255 , 0 , 0 1 2\n";
-    Text messages = scene_messages("s.rt", text, true);
+    OwnedText messages = scene_messages("s.rt", text, true);
     assert_string_equal(text_c(&messages), "3:10: warning: 'ratio' is above 1; used unchanged\n"
                                            "4:31: warning: skipped 'cb:8'\n"
                                            "5:22: warning: skipped 'earth.xpm'\n"
                                            "6:16: warning: the color stands before the sizes\n");
-    text_free(&messages);
-    Text source = {0};
+    OwnedText source = {0};
     text_appendf(&source, "%s", text);
-    MessageList list = {0};
-    Scene scene;
+    OwnedMessageList list = {0};
+    OwnedScene scene;
     assert_true(scene_read_text(&scene, "s.rt", &source, true, &list));
-    message_list_free(&list);
-    text_free(&source);
     assert_vector(scene.camera.position, 0, 0, -5);
     assert_vector(scene.lights.items[0].position, 1, 2, 3);
     assert_vector(scene.lights.items[0].color, 1.5, 0, 0);
     assert_vector(scene.objects.items[0].as.sphere.center, 1, 2, 3);
     assert_number(scene.materials.items[0].specular.largest, 0.5);
-    scene_free(&scene);
 }
 
 TEST(test_lenient_keeps_other_errors)
 {
-    Text messages = scene_messages("s.rt",
-                                   LIT "sp 0,0,0 -2 255,0,0\nsp 0, ,0 2 255,0,0\nsp 0, 0 2 255,0,0\n"
-                                       "L 0,0,0 -1\n",
-                                   true);
+    OwnedText messages = scene_messages("s.rt",
+                                        LIT "sp 0,0,0 -2 255,0,0\nsp 0, ,0 2 255,0,0\nsp 0, 0 2 255,0,0\n"
+                                            "L 0,0,0 -1\n",
+                                        true);
     assert_string_equal(text_c(&messages),
                         "3:10: error: 'diameter' must be greater than 0\n"
                         "4:7: error: 'center' must be a number, not nothing\n"
                         "5:4: error: 'center' must be three numbers with commas between, not '0, 0'\n"
                         "6:9: error: 'ratio' must be 0 or more\n");
-    text_free(&messages);
 }
 
 TEST(test_many_warnings_are_counted)
 {
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, LIT);
     for (int i = 0; i < 30; i++)
         text_appendf(&text, "pl 0,0,0 0,0.5,0 255,0,0\n");
-    Text messages = scene_messages("s.rt", text_c(&text), false);
+    OwnedText messages = scene_messages("s.rt", text_c(&text), false);
     assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not a unit vector; normalized\n"
                                               "warning: s.rt: 10 more warnings\n"));
-    text_free(&messages);
-    text_free(&text);
 }
 
 TEST_MAIN(set_up, complete_close)

@@ -152,7 +152,7 @@ TEST(an_instance_may_have_a_material)
     snprintf(name, sizeof name, "%s/m.obj", folder);
     file_write(name, "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl gray\nf 1 2 3\n");
     snprintf(name, sizeof name, "%s/a.yaml", folder);
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         name, SCENE "materials: {red: {color: [1, 0, 0]}, blue: {color: [0, 0, 1]}}\n"
                     "define: {pair: {objects: [{sphere: {center: [0, 0, 0], radius: 1, material: red}},"
                     " {mesh: {file: m.obj}}]}}\n"
@@ -168,7 +168,6 @@ TEST(an_instance_may_have_a_material)
     assert_string_equal(scene.material_names.items[object_material(&scene, &scene.objects.items[3], 0)],
                         "blue");
     assert_int_equal(scene.objects.items[3].line, 5);
-    scene_free(&scene);
     scratch_close(folder);
 }
 

@@ -92,7 +92,7 @@ TEST(test_materials)
 
 TEST(test_tints)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("a.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
                                 "materials:\n"
                                 "  gold: {reflection: [0.5, 0.4, 0], specular: [1, 2, 4], fresnel: true}\n"
@@ -132,7 +132,6 @@ TEST(test_tints)
     assert_vector(gray[5].conductor.k, 1, 3, 4);
     assert_number(gray[5].reflection.largest, 0.5);
     assert_number(gray[5].ambient, 2);
-    scene_free(&scene);
 }
 
 TEST(test_energy)
@@ -224,7 +223,7 @@ TEST(test_flat_shapes)
 
 TEST(test_defaults)
 {
-    Scene scene = scene_of_text("s.yaml", CAMERA);
+    OwnedScene scene = scene_of_text("s.yaml", CAMERA);
     assert_vector(scene.camera.up, 0, 1, 0);
     assert_number(scene.camera.half_tangent, tan(25 * M_PI / 180));
     assert_vector(scene.background, 0, 0, 0);
@@ -232,37 +231,34 @@ TEST(test_defaults)
     assert_int_equal(scene.lights.count, 0);
     assert_int_equal(scene.materials.count, 0);
     assert_int_equal(scene.objects.count, 0);
-    scene_free(&scene);
 }
 
 TEST(test_focal_length)
 {
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2], "
                   "shift: [-0.5, 0.25]}\n");
     assert_int_equal(scene.camera.field_axis, FIELD_HORIZONTAL);
     assert_number(scene.camera.half_tangent, 0.75);
     assert_number(scene.camera.frame_aspect, 1.5);
     assert_true(scene.camera.shift[0] == -0.5 && scene.camera.shift[1] == 0.25);
-    scene_free(&scene);
 }
 
 TEST(test_block_style_and_number_forms)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("s.yaml", "\xEF\xBB\xBF---\r\n" // byte order mark, document start, CRLF
                                 "\"camera\":\r\n  position:\r\n    - +1.\r\n    - -.5\r\n    - 25e-1\r\n"
                                 "  look_at: ['0', \"0\", 1E+2]\r\n...\r\n");
     assert_vector(scene.camera.position, 1, -0.5, 2.5);
     assert_vector(scene.camera.look_at, 0, 0, 100);
-    scene_free(&scene);
 }
 
 TEST(test_names_in_every_style)
 {
     char name[400 + 1] = {0}; // longer than one read of a scalar
     memset(name, 'n', sizeof name - 1);
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "s.yaml",
         formatted(CAMERA
                   "materials:\n  two words: {}\n  'it''s': {}\n  \"caf\\u00e9\\t\\\"x\\\"\": {}\n  %s: {}\n"
@@ -273,21 +269,19 @@ TEST(test_names_in_every_style)
     assert_string_equal(scene.material_names.items[2], "caf\xC3\xA9\t\"x\"");
     assert_string_equal(scene.material_names.items[3], name);
     assert_string_equal(scene.material_names.items[4], "it's folded");
-    scene_free(&scene);
 }
 
 TEST(test_tiny_numbers_are_zero)
 {
-    Scene scene = scene_of_text("s.yaml", CAMERA "background: [1e-31, 1e-999, 1e-30]\n");
+    OwnedScene scene = scene_of_text("s.yaml", CAMERA "background: [1e-31, 1e-999, 1e-30]\n");
     assert_true(scene.background.x == 0 && scene.background.y == 0 && scene.background.z == 1e-30);
-    scene_free(&scene);
 }
 
 // The linear values of sRGB are those of Python's decimal module, rounded to float.
 TEST(test_colors)
 {
     const double half = 0.21586050011389926F, dark = 0.0030352698354883752F, third = 0.033104766570885055F;
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("s.yaml", CAMERA "background: '#FF800a'\n"
                                        "ambient: 0.1\n"
                                        "lights:\n"
@@ -312,18 +306,15 @@ TEST(test_colors)
     assert_vector(materials[2].checker.colors[0], 0, 1, 0);
     assert_vector(materials[2].checker.colors[1], 0.25, 0.25, 0.25);
     assert_vector(materials[3].color, 1.5, 0, 0);
-    scene_free(&scene);
 }
 
 static Scene scene_of_set(const char *text, const char *const *overrides, size_t count)
 {
-    Text source = {0};
+    OwnedText source = {0};
     text_appendf(&source, "%s", text);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     assert_true(scene_read_set(&scene, "s.yaml", &source, overrides, count, &messages));
-    message_list_free(&messages);
-    text_free(&source);
     return scene;
 }
 
@@ -333,7 +324,7 @@ static Scene scene_of_set(const char *text, const char *const *overrides, size_t
 
 TEST(test_values_are_set)
 {
-    Scene scene =
+    OwnedScene scene =
         SET(LIT SPHERE, "camera.fov=60", "ambient=#f00", "background= 0.5", "camera.fov=40",
             "objects[0].sphere.radius=3", "lights[0].point={position: [1, 2, 3], color: red}",
             "materials={red: {color: red}, 'a.b': {}}", "materials.'a.b'.color=[0, 0.5, 0]",
@@ -350,12 +341,11 @@ TEST(test_values_are_set)
     assert_vector(scene.lights.items[0].position, 1, 2, 3);
     assert_vector(scene.materials.items[scene.objects.items[0].material].color, 1, 0, 0);
     assert_vector(scene.materials.items[scene.objects.items[1].material].color, 0, 0.5, 0);
-    scene_free(&scene);
 }
 
 TEST(test_values_are_removed)
 {
-    Scene scene =
+    OwnedScene scene =
         SET("camera: {position: [0, 0, -5], look_at: [0, 0, 0], focal_length: 1, frame: [2, 1]}\n"
             "lights: [{point: {position: [0, 9, 0]}}]\n"
             "objects: [{sphere: {center: [0, 0, 0], radius: 1}}, {sphere: {center: [1, 0, 0], radius: 2}},\n"
@@ -367,18 +357,18 @@ TEST(test_values_are_removed)
     assert_number(scene.objects.items[0].as.sphere.radius, 3);
     assert_int_equal(scene.objects.items[1].type, SHAPE_BOX);
     assert_int_equal(scene.lights.count, 0);
-    scene_free(&scene);
 }
 
 // A value that is set through one of several names of the same nodes changes only under that name.
 TEST(test_aliases_keep_what_is_set_elsewhere)
 {
-    Scene scene = SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
-                          "objects:\n  - &s sphere: {center: [0, 0, 0], radius: 1}\n"
-                          "  - sphere: &t {center: [9, 9, 9], radius: 1}\n  - sphere: *t\n  - sphere: *t\n",
-                      "materials.b.color=red", "materials.a.ior=3", "materials.c.diffuse=0.5",
-                      "materials.b.ior=", "objects[2].sphere.center[1]=5", "objects[1].sphere.radius=7",
-                      "objects[3].sphere={center: &u [1, 2, 3], radius: 4, material: {diffuse: *u}}");
+    OwnedScene scene =
+        SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
+                "objects:\n  - &s sphere: {center: [0, 0, 0], radius: 1}\n"
+                "  - sphere: &t {center: [9, 9, 9], radius: 1}\n  - sphere: *t\n  - sphere: *t\n",
+            "materials.b.color=red", "materials.a.ior=3", "materials.c.diffuse=0.5",
+            "materials.b.ior=", "objects[2].sphere.center[1]=5", "objects[1].sphere.radius=7",
+            "objects[3].sphere={center: &u [1, 2, 3], radius: 4, material: {diffuse: *u}}");
     const Material *materials = scene.materials.items;
     assert_vector(materials[0].color, 0, 0, 1);
     assert_vector(materials[1].color, 1, 0, 0);
@@ -394,16 +384,15 @@ TEST(test_aliases_keep_what_is_set_elsewhere)
     assert_number(objects[1].as.sphere.radius, 7);
     assert_number(objects[2].as.sphere.radius, 1);
     assert_vector(materials[objects[3].material].diffuse, 1, 2, 3);
-    scene_free(&scene);
 }
 
 // A message about an image that was set points into the override's text.
 TEST(test_textures_that_are_set_have_a_place)
 {
     static const char *const overrides[] = {"ambient=1", "objects[0].sphere.material={image: lost.png}"};
-    Text source = {0}, described = {0};
+    OwnedText source = {0}, described = {0};
     text_append(&source, LIT SPHERE, strlen(LIT SPHERE));
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     assert_false(scene_read_set(&scene, "s.yaml", &source, overrides, 2, &messages));
     assert_int_equal(messages.count, 1);
@@ -411,9 +400,6 @@ TEST(test_textures_that_are_set_have_a_place)
     assert_string_equal(text_c(&described),
                         "--set:1:36: error: cannot read 'lost.png': No such file or directory\n");
     assert_string_equal(messages.items[0].source_line, overrides[1]);
-    text_free(&described);
-    text_free(&source);
-    message_list_free(&messages);
 }
 
 // Writes an image of one pixel, 1 in the default layer and 2 in `diffuse`.
@@ -434,7 +420,7 @@ TEST_WITH(test_layers_of_images, folder_open, folder_close)
 {
     assert_int_equal(mkdir("scenes", 0700), 0);
     write_layered_image("scenes/a.exr");
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("scenes/s.yaml", CAMERA "materials:\n"
                                               "  a: {image: {file: a.exr, layer: diffuse}}\n"
                                               "  b: {image: a.exr}\n"
@@ -449,16 +435,14 @@ TEST_WITH(test_layers_of_images, folder_open, folder_close)
     static const uint32_t textures[] = {1, 2, 2, 1};
     for (size_t i = 0; i < 4; i++)
         assert_int_equal(scene.materials.items[i].image.texture, textures[i]);
-    scene_free(&scene);
 }
 
 TEST(test_materials_may_follow_objects)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("s.yaml", LIT "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: b}\n"
                                     "materials: {a: {}, b: {shininess: 7}}\n");
     assert_number(scene.materials.items[scene.objects.items[0].material].shininess, 7);
-    scene_free(&scene);
 }
 
 TEST(test_warnings)
@@ -472,9 +456,9 @@ TEST(test_warnings)
 
 TEST(test_a_failed_scene_is_empty)
 {
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, LIT SPHERE "purple: 1\n");
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Scene scene;
     assert_false(scene_read_text(&scene, "s.yaml", &text, false, &messages));
     assert_null(scene.objects.items);
@@ -482,8 +466,6 @@ TEST(test_a_failed_scene_is_empty)
     assert_int_equal(scene.objects.count, 0);
     assert_string_equal(messages.items[0].file, "s.yaml");
     assert_string_equal(messages.items[0].source_line, "purple: 1");
-    text_free(&text);
-    message_list_free(&messages);
 }
 
 // A node's offsets cannot count this many bytes. Those beyond the scene here are never read.

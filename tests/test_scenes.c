@@ -42,14 +42,12 @@ TEST(scenes_render)
     assert_int_equal(glob("scenes/*.*", 0, NULL, &scenes), 0);
     assert_true(scenes.gl_pathc >= SCENES_MIN);
     for (size_t i = 0; i < scenes.gl_pathc; i++) {
-        Scene scene = scene_of_file(scenes.gl_pathv[i]);
+        OwnedScene scene = scene_of_file(scenes.gl_pathv[i]);
         const RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
         const size_t faulty = film_count_faulty(&film), colors = color_count(&film);
         if (faulty > 0 || colors < COLORS_MIN)
             fail_msg("%s: %zu faulty pixels, %zu colors", scenes.gl_pathv[i], faulty, colors);
-        film_free(&film);
-        scene_free(&scene);
     }
     globfree(&scenes);
 }

@@ -14,7 +14,7 @@
 // BVH in several packets, since the light is above the corner of a tile.
 TEST(takes_a_veils_light_once)
 {
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "veil.yaml", "camera: {position: [0, 9, 0.01], look_at: [0, 0, 0], up: [0, 0, 1], fov: 40}\n"
                      "background: [0, 0, 0]\n"
                      "lights: [{point: {position: [0.013, 5, 0.017]}}]\n"
@@ -26,24 +26,21 @@ TEST(takes_a_veils_light_once)
     RenderSettings settings = film_settings(101, 101, PRECISION_STRICT);
     settings.lanes = 1;
     settings.bvh = BVH_OFF;
-    Film expected = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm expected = film_render(&probe_compute, &scene, &settings, 0);
     for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         settings.lanes = *lanes;
         for (BvhChoice bvh = BVH_ON; bvh <= BVH_OFF; bvh++) {
             settings.bvh = bvh;
-            Film film = film_render(&probe_compute, &scene, &settings, 0);
+            OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
             film_assert_same(&film, &expected, bvh_choice_names[bvh]);
-            film_free(&film);
         }
     }
-    film_free(&expected);
-    scene_free(&scene);
 }
 
 // Squares of distances to the light times squares of sizes are beyond a float's range.
 TEST(darkens_an_eclipse_in_meters)
 {
-    Scene scene = scene_of_text(
+    OwnedScene scene = scene_of_text(
         "eclipse.yaml", "camera: {position: [1.4998e11, 0, -3e7], look_at: [1.4998e11, 0, 0], fov: 60}\n"
                         "background: [0, 0, 0]\n"
                         "lights: [{point: {position: [0, 0, 0]}}]\n"
@@ -52,7 +49,7 @@ TEST(darkens_an_eclipse_in_meters)
                         "  - sphere: {center: [1.4998e11, 0, 0], radius: 1e7}\n");
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(64, 64, precision);
-        Film film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
         size_t seen = 0, lit = 0;
         for (size_t i = 0; i < (size_t)film.width * film.height; i++) {
             if (film.object[i] == UINT32_MAX) continue;
@@ -61,9 +58,7 @@ TEST(darkens_an_eclipse_in_meters)
         }
         assert_true(seen > 500);
         assert_int_equal(lit, 0);
-        film_free(&film);
     }
-    scene_free(&scene);
 }
 
 // Returns a ball of 12 x 8 quadrilaterals with the normals of a sphere.
@@ -93,14 +88,14 @@ static Mesh coarse_ball(void)
 TEST(smooth_meshes_do_not_shade_themselves)
 {
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
-        Scene scene =
+        OwnedScene scene =
             scene_of_text("ball.yaml", "camera: {position: [0, 0.6, 4.2], look_at: [0, 0, 0], fov: 32}\n"
                                        "lights: [{directional: {direction: [-1, -0.25, 0.15]}}]\n"
                                        "objects: [{sphere: {center: [1.5, 0.5, 0], radius: 0.35}}]\n");
         array_push(scene.meshes, coarse_ball());
         array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
         const RenderSettings settings = film_settings(160, 120, precision);
-        Film film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_SHADOW | AOV_OBJECT);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_SHADOW | AOV_OBJECT);
         const Vector3 to_light = vector_normalize((Vector3){1, 0.25, -0.15});
         size_t lit = 0, dark = 0;
         for (size_t i = 0; i < (size_t)film.width * film.height; i++) {
@@ -112,8 +107,6 @@ TEST(smooth_meshes_do_not_shade_themselves)
         }
         assert_true(lit >= 2000 && lit <= 5000);
         assert_true(dark >= 20 && dark <= 100); // by the small ball
-        film_free(&film);
-        scene_free(&scene);
     }
 }
 
@@ -128,7 +121,7 @@ TEST(smooth_meshes_do_not_shade_themselves)
 static void compare_with_reference(const Scene *scene, RenderSettings settings, double error,
                                    const char *what)
 {
-    Film film = film_render(&probe_compute, scene, &settings, AOV_T | AOV_SHADOW), perturbed = {0};
+    OwnedFilm film = film_render(&probe_compute, scene, &settings, AOV_T | AOV_SHADOW), perturbed = {0};
     settings.perturb_seed = 1;
     if (!tests_are_long()) settings.extra_features = GROUND_FEATURES;
     if (settings.precision == PRECISION_SINGLE) perturbed = film_render(&probe_compute, scene, &settings, 0);
@@ -150,8 +143,6 @@ static void compare_with_reference(const Scene *scene, RenderSettings settings, 
     }
     assert_true(open <= film.width * film.height / 10);
     assert_true(dark > 20);
-    film_free(&film);
-    film_free(&perturbed);
 }
 
 // Ground whose coordinates are a million times the size of the objects on it. Floats there are 0.5 apart.
@@ -186,23 +177,22 @@ static const Ground grounds[] = {
 // of a degree high.
 static void keeps_small_shadows_on(const Ground *ground)
 {
-    Scene scene = scene_of_text("ground.yaml",
-                                formatted("camera: {position: [0, 2, 0], look_at: [0, 1, 2], fov: 60}\n"
-                                          "lights:\n"
-                                          "  - directional: {direction: [0.5, -0.75, 0.5], intensity: 0.5}\n"
-                                          "  - directional: {direction: [-1, -0.001, 0.25], intensity: 0.5}\n"
-                                          "  - point: {position: [1, 4, 1], intensity: 0.5}\n"
-                                          "objects:\n"
-                                          "  - %s\n"
-                                          "  - sphere: {center: [-0.25, 0.0625, 2], radius: 0.01}\n"
-                                          "  - sphere: {center: [0.25, 0.0625, 2.5], radius: 0.03125}\n"
-                                          "  - sphere: {center: [0, 0.25, 4], radius: 0.25}\n",
-                                          ground->shape));
+    OwnedScene scene = scene_of_text(
+        "ground.yaml", formatted("camera: {position: [0, 2, 0], look_at: [0, 1, 2], fov: 60}\n"
+                                 "lights:\n"
+                                 "  - directional: {direction: [0.5, -0.75, 0.5], intensity: 0.5}\n"
+                                 "  - directional: {direction: [-1, -0.001, 0.25], intensity: 0.5}\n"
+                                 "  - point: {position: [1, 4, 1], intensity: 0.5}\n"
+                                 "objects:\n"
+                                 "  - %s\n"
+                                 "  - sphere: {center: [-0.25, 0.0625, 2], radius: 0.01}\n"
+                                 "  - sphere: {center: [0.25, 0.0625, 2.5], radius: 0.03125}\n"
+                                 "  - sphere: {center: [0, 0.25, 4], radius: 0.25}\n",
+                                 ground->shape));
     for (Precision precision = ground->from; precision < ARITHMETIC_COUNT; precision++) {
         if (precision < probe_sound_from() || !probe_has(precision)) continue;
         compare_with_reference(&scene, film_settings(128, 96, precision), ground->error, ground->name);
     }
-    scene_free(&scene);
 }
 
 TEST(keeps_small_shadows_on_huge_ground)

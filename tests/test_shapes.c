@@ -173,9 +173,8 @@ static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, s
 static bool scene_has_eye_powers(const Scene *scene, Precision precision)
 {
     const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .precision = precision};
-    CompiledScene compiled = scene_compiled(scene, &settings);
+    OwnedCompiledScene compiled = scene_compiled(scene, &settings);
     const bool has = (compiled.features & FEATURE_EYE_POWERS) != 0;
-    compiled_scene_free(&compiled);
     return has;
 }
 

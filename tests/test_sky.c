@@ -146,14 +146,14 @@ TEST(an_image_is_a_light)
 // with the colors h and z reflects the integral of 2 c (h + (z - h) c) from c = 0 to the root of 1/2.
 TEST(what_hides_the_sky_casts_a_shadow)
 {
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("s.yaml", HEAD "background: {horizon: [0.5, 1, 2], zenith: [2, 1, 0], light: true}\n"
                                      "objects:\n"
                                      "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                                      "  - disc: {center: [0, 1, 0], normal: [0, 1, 0], radius: 1}\n");
     RenderSettings settings = film_settings(2, 2, PRECISION_STRICT);
     settings.sample_count = 4096;
-    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
     const double c = sqrt(0.5), horizon[] = {0.5, 1, 2}, zenith[] = {2, 1, 0};
     for (size_t i = 0; i < 4; i++)
         for (size_t channel = 0; channel < 3; channel++) {
@@ -161,8 +161,6 @@ TEST(what_hides_the_sky_casts_a_shadow)
             const double expected = h * c * c + 2 * (z - h) * c * c * c / 3;
             assert_near((double)film.color[3 * i + channel], expected, 0.004);
         }
-    film_free(&film);
-    scene_free(&scene);
 }
 
 // A wall is lit by what the eye sees of the sky, whichever way the sky is turned.
@@ -175,7 +173,7 @@ TEST(what_is_seen_shines)
         "camera: {position: [0, 0, 0], look_at: [0, 0, -1], projection: equirectangular}\n%s", sky);
     Scene scene = scene_of_text("sky.yaml", text);
     RenderSettings settings = film_settings(COLUMNS, ROWS, PRECISION_STRICT);
-    Film seen = film_render(&probe_compute, &scene, &settings, AOV_RAY);
+    OwnedFilm seen = film_render(&probe_compute, &scene, &settings, AOV_RAY);
     scene_free(&scene);
     free(text);
     static const Vector3 normals[] = {{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, {-0.6, 0, 0.8}};
@@ -195,16 +193,14 @@ TEST(what_is_seen_shines)
         scene = scene_of_text("sky.yaml", text);
         settings = film_settings(1, 1, PRECISION_STRICT);
         settings.sample_count = 1024;
-        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
         const double allowed = 0.02 * vector_largest(expected);
         assert_near(film.color[0], expected.x, allowed);
         assert_near(film.color[1], expected.y, allowed);
         assert_near(film.color[2], expected.z, allowed);
-        film_free(&film);
         scene_free(&scene);
         free(text);
     }
-    film_free(&seen);
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -159,9 +159,8 @@ static Renderer *moved_renderer(Scene *scene, RenderSettings settings)
     settings.moves = true;
     Renderer *renderer = probe_renderer(scene, &settings);
     scene->camera = camera;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     must(renderer && renderer_move(renderer, scene, &settings, &messages), "renderer_move");
-    message_list_free(&messages);
     return renderer;
 }
 
@@ -170,10 +169,10 @@ static Renderer *moved_renderer(Scene *scene, RenderSettings settings)
 static uint64_t soak_render(uint64_t seed, Renderer *renderers[PRECISION_COUNT])
 {
     Random random = {seed};
-    Scene scene = soak_scene(&random);
+    OwnedScene scene = soak_scene(&random);
     const RenderSettings settings = soak_settings(&random);
     Renderer *renderer = renderers ? renderers[settings.precision] : NULL;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     if (renderer)
         must(renderer_move(renderer, &scene, &settings, &messages), "renderer_move");
     else if (!renderers && seed % 2 > 0)
@@ -181,15 +180,12 @@ static uint64_t soak_render(uint64_t seed, Renderer *renderers[PRECISION_COUNT])
     else
         renderer = probe_renderer(&scene, &settings);
     must(renderer, "renderer_open");
-    message_list_free(&messages);
-    Film film;
+    OwnedFilm film;
     must(renderer_render_film(renderer, (unsigned)random_bits(&random) & AOVS_ALL, &film),
          "renderer_render_film");
     renderer_report_restart(renderer);
     uint64_t hash = film_hash(&film);
-    film_free(&film);
     if (random_index(&random, 4) == 0) hash = rays_hash(renderer, &random, hash);
-    scene_free(&scene);
     if (renderers)
         renderers[settings.precision] = renderer;
     else

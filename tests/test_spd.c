@@ -52,7 +52,7 @@ static void glass_reflect(Scene *scene)
 // including the camera ray.
 static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
 {
-    Scene scene = scene_of_file(formatted(SPD "/%s.nff", name));
+    OwnedScene scene = scene_of_file(formatted(SPD "/%s.nff", name));
     glass_reflect(&scene);
     scene.camera.half_tangent *= 513.0 / 512;
     RenderSettings settings = film_settings(513, 513, PRECISION_SINGLE);
@@ -64,7 +64,6 @@ static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
     for (size_t i = 0; i < COLUMN_COUNT; i++)
         counts[i] = renderer_report(renderer)->rays[column_rays[i]];
     renderer_close(renderer);
-    scene_free(&scene);
 }
 
 TEST(test_counts)

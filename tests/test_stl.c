@@ -20,7 +20,7 @@ static void assert_square(const char *messages)
 {
     static const double expected[6][2] = {{0, 0}, {1, 0}, {0, 1}, {0, 1}, {1, 0}, {1, 1}};
     assert_messages("scene.yaml", SCENE, messages);
-    Scene scene = scene_of_text("scene.yaml", SCENE);
+    OwnedScene scene = scene_of_text("scene.yaml", SCENE);
     const Mesh *mesh = &scene.meshes.items[0];
     assert_int_equal(mesh->triangle_count, 2);
     assert_int_equal(mesh->vertex_count, 4);
@@ -29,7 +29,6 @@ static void assert_square(const char *messages)
         assert_vector(corner, expected[i][0], expected[i][1], 0);
         assert_vector(mesh->normals[mesh->triangles[i / 3][i % 3]], 0, 0, 1);
     }
-    scene_free(&scene);
 }
 
 TEST(text_is_read)

@@ -75,15 +75,13 @@ static Scene scene_make(const char *camera, const char *object)
 // Checks the color along the camera's axis by one ray.
 static void check_seen(const char *camera, const char *object, double red, double green, double blue)
 {
-    Scene scene = scene_make(camera, object);
+    OwnedScene scene = scene_make(camera, object);
     RenderSettings settings = film_settings(1, 1, PRECISION_STRICT);
-    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
     const double expected[3] = {red, green, blue};
     for (size_t i = 0; i < 3; i++)
         if (!(fabs(film.color[i] - expected[i]) < 2e-7))
             fail_msg("%s: channel %zu is %.9g, not %.9g", camera, i, film.color[i], expected[i]);
-    film_free(&film);
-    scene_free(&scene);
 }
 
 #define BALL          "sphere: {center: [0, 0, 0], radius: 1,"
@@ -196,12 +194,13 @@ static void check_places(const char *camera, const char *object, TextureMap map,
 {
     TestTexture texture = texture_make(4, 2);
     texture_write(&texture);
-    Scene scene = scene_make(camera, object);
+    OwnedScene scene = scene_make(camera, object);
     memcpy(scene.materials.items[0].image.wraps, wraps, sizeof scene.materials.items[0].image.wraps);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
-        Film film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_POSITION | AOV_OBJECT);
+        OwnedFilm film =
+            film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_POSITION | AOV_OBJECT);
         double allowed = precision == PRECISION_DOUBLE ? 0x1p-48 : 0x1p-19, largest = 0;
         size_t seen = 0;
         for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
@@ -219,9 +218,7 @@ static void check_places(const char *camera, const char *object, TextureMap map,
         assert_true(seen >= WIDTH * HEIGHT / 4 && seen <= WIDTH * HEIGHT);
         if (!(largest <= allowed))
             fail_msg("%s, %s: off by %g, more than %g", object, precision_names[precision], largest, allowed);
-        film_free(&film);
     }
-    scene_free(&scene);
 }
 
 TEST(sphere_agrees_all_around)
@@ -321,12 +318,12 @@ TEST(mirrors_filter_textures)
 
 static void check_builds(const char *path)
 {
-    Scene scene = scene_of_file(path);
+    OwnedScene scene = scene_of_file(path);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(71, 41, precision);
         settings.lanes = 1;
         settings.instances = INSTANCES_SHARED;
-        Film expected = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm expected = film_render(&probe_compute, &scene, &settings, 0);
         assert_int_equal(film_count_faulty(&expected), 0);
         const uint32_t *tested = tested_lanes(probe_compute.device);
         for (const uint32_t *lanes = tested; *lanes; lanes++) {
@@ -335,17 +332,13 @@ static void check_builds(const char *path)
             // builds without other features take long, so short tests have them at one precision
             const bool is_lean = precision == probe_same_bits_from() || tests_are_long();
             settings.extra_features = is_lean && *lanes != tested[1] ? 0 : FEATURE_ALL;
-            Film film = film_render(&probe_compute, &scene, &settings, 0);
+            OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
             film_assert_same(&film, &expected, precision_names[precision]);
-            film_free(&film);
         }
         settings.bvh = BVH_OFF;
-        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
         film_assert_same(&film, &expected, "without a BVH");
-        film_free(&film);
-        film_free(&expected);
     }
-    scene_free(&scene);
 }
 
 TEST(every_build_gives_the_same_bits)
@@ -361,7 +354,7 @@ TEST(every_build_has_the_same_holes)
 // Instances that share a mesh have the holes of copies, but for pixels whose ray is at an edge.
 TEST(instances_have_the_holes_of_copies)
 {
-    Scene scene = scene_of_file("tests/scenes/cutouts.yaml");
+    OwnedScene scene = scene_of_file("tests/scenes/cutouts.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
     Film films[2];
     for (size_t i = 0; i < 2; i++) {
@@ -380,7 +373,6 @@ TEST(instances_have_the_holes_of_copies)
         fail_msg("%zu objects and %zu shadows differ, %zu pixels show instances", objects, shadows, seen);
     film_free(&films[0]);
     film_free(&films[1]);
-    scene_free(&scene);
 }
 
 // Scenes have cutouts only if a pixel is transparent.
@@ -391,13 +383,12 @@ TEST(opaque_images_cut_nothing)
         const char *text = formatted("camera: {%s}\nlights: [{point: {position: [0, 5, 5]}}]\n"
                                      "objects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
                                      FROM(0, 0, 5), BALL, images[i]);
-        Scene scene = scene_of_text("s.yaml", text);
+        OwnedScene scene = scene_of_text("s.yaml", text);
         assert_int_equal((features_of(&scene) & FEATURE_CUTOUTS) != 0, i == 1);
         assert_messages("s.yaml", text,
                         i == 1 ? ""
                                : "3:69: warning: the alpha of 'scenes/images/globe.png' is 1 everywhere: "
                                  "nothing is cut out\n");
-        scene_free(&scene);
     }
 }
 
@@ -412,14 +403,12 @@ static void check_shade(const char *camera, const char *object, const char *more
                                  "define: {square: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
                                  "objects: [{%s material: {ambient: 0, normal_map: %s%s}}}]\n",
                                  camera, light, object, texture_path, more);
-    Scene scene = scene_of_text("s.yaml", text);
+    OwnedScene scene = scene_of_text("s.yaml", text);
     RenderSettings settings = film_settings(1, 1, PRECISION_STRICT);
     settings.instances = INSTANCES_SHARED;
-    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
     if (!(fabs(film.color[0] - expected) < 4e-7))
         fail_msg("%s: the shade is %.9g, not %.9g", text, film.color[0], expected);
-    film_free(&film);
-    scene_free(&scene);
 }
 
 #define SQUARE "mesh: {file: tests/textures/quad.obj,"
@@ -464,7 +453,7 @@ TEST(flat_normal_maps_change_nothing)
     Film films[2];
     for (int i = 0; i < 2; i++) {
         const char *map = i == 1 ? formatted(", normal_map: %s, normal_strength: 3", texture_path) : "";
-        Scene scene = scene_of_text(
+        OwnedScene scene = scene_of_text(
             "s.yaml", formatted("camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
                                 "lights: [{point: {position: [2, 3, 4]}}]\n"
                                 "materials: {shiny: {specular: 0.5, reflection: 0.3%s}}\n"
@@ -476,7 +465,6 @@ TEST(flat_normal_maps_change_nothing)
         assert_int_equal((features_of(&scene) & FEATURE_NORMAL_MAPS) != 0, i == 1);
         const RenderSettings settings = film_settings(64, 48, PRECISION_STRICT);
         films[i] = film_render(&probe_compute, &scene, &settings, 0);
-        scene_free(&scene);
     }
     film_assert_same(&films[1], &films[0], "a flat normal map");
     film_free(&films[0]);
@@ -498,7 +486,7 @@ TEST(jpeg_is_read)
     assert_int_equal(fwrite(bytes, 1, length, file), length);
     fclose(file);
     Image image;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     assert_true(image_read(&image, texture_path, NULL, &messages));
     assert_int_equal(image.width, SIDE);
     assert_int_equal(image.height, SIDE);
@@ -510,17 +498,14 @@ TEST(jpeg_is_read)
     double linear[3];
     for (size_t i = 0; i < 3; i++)
         linear[i] = pow(((double)pixels[i] / 255 + 0.055) / 1.055, 2.4);
-    Scene scene = scene_make(FROM(0, 0, 5), BALL);
+    OwnedScene scene = scene_make(FROM(0, 0, 5), BALL);
     RenderSettings settings = film_settings(1, 1, PRECISION_SINGLE);
-    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
     for (size_t i = 0; i < 3; i++)
         assert_true(fabs(film.color[i] - linear[i]) < 0.015);
-    film_free(&film);
-    scene_free(&scene);
 
     assert_int_equal(truncate(texture_path, 20), 0);
     assert_false(image_read(&image, texture_path, NULL, &messages));
-    message_list_free(&messages);
     tjFree(bytes);
     tjDestroy(encoder);
 }
@@ -555,10 +540,9 @@ TEST(scene_faults_are_reported)
 // Checks the message about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
-    Text described = scene_messages("s.yaml", scene_text(FROM(0, 0, 5), BALL), false);
+    OwnedText described = scene_messages("s.yaml", scene_text(FROM(0, 0, 5), BALL), false);
     if (!strstr(text_c(&described), expected) || strncmp(text_c(&described), "3:30: error: ", 13) != 0)
         fail_msg("%s lacks %s", text_c(&described), expected);
-    text_free(&described);
 }
 
 TEST(texture_faults_are_reported)
@@ -580,7 +564,7 @@ TEST(textures_are_shared)
 {
     const TestTexture texture = texture_make(3, 2);
     texture_write(&texture);
-    Scene scene =
+    OwnedScene scene =
         scene_of_text("scenes/images/s.yaml",
                       formatted(MATERIALS "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
                                           "  c: {image: globe.png}\n  d: {image: %s}\n",
@@ -589,7 +573,6 @@ TEST(textures_are_shared)
     assert_string_equal(scene.textures.items[0].path, "scenes/images/globe.png");
     assert_string_equal(scene.textures.items[2].path, texture_path);
     assert_int_equal(scene.materials.items[2].image.texture, 1);
-    scene_free(&scene);
 }
 
 TEST_MAIN(textures_open, textures_close)

@@ -61,7 +61,7 @@ TEST(lanes_agree)
 {
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
-        Film expected = {0};
+        OwnedFilm expected = {0};
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             settings.lanes = *lanes;
             char what[64];
@@ -73,7 +73,6 @@ TEST(lanes_agree)
             else
                 same_and_freed(&film, &expected, what);
         }
-        film_free(&expected);
     }
 }
 
@@ -84,16 +83,14 @@ TEST(lanes_agree_on_aovs)
     for (Precision precision = from; precision <= (tests_are_long() ? PRECISION_STRICT : from); precision++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         settings.lanes = 1;
-        Film expected = film_render(&probe_compute, &every_shape, &settings, aovs);
+        OwnedFilm expected = film_render(&probe_compute, &every_shape, &settings, aovs);
         assert_int_equal(film_count_faulty(&expected), 0);
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             if (*lanes == 1) continue;
             settings.lanes = *lanes;
-            Film film = film_render(&probe_compute, &every_shape, &settings, aovs);
+            OwnedFilm film = film_render(&probe_compute, &every_shape, &settings, aovs);
             film_assert_same(&film, &expected, "lanes");
-            film_free(&film);
         }
-        film_free(&expected);
     }
 }
 
@@ -230,40 +227,36 @@ TEST(features_alone_and_all_together_agree)
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     const size_t count = COUNT_OF(feature_scenes);
     for (size_t i = 0; i < count - (tests_are_long() ? 0 : LONG_SCENES); i++) {
-        Scene scene = scene_of_text("feature.yaml", feature_scenes[i].text);
+        OwnedScene scene = scene_of_text("feature.yaml", feature_scenes[i].text);
         assert_int_equal(features_of(&scene), feature_scenes[i].features);
         seen |= feature_scenes[i].features;
 
         settings.extra_features = tests_are_long() ? 0 : features_of_group(i);
         Film specialised = render(&scene, &settings);
         settings.extra_features = FEATURE_ALL;
-        Film general = render(&scene, &settings);
+        OwnedFilm general = render(&scene, &settings);
         same_and_freed(&specialised, &general, feature_scenes[i].text);
-        film_free(&general);
-        scene_free(&scene);
     }
     // these depend on numbers and settings, and have separate tests
     assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_INSTANCES, FEATURE_ALL);
 
     // No scene needs only checkers, so they are built in without need, on an empty scene.
-    Scene empty = scene_of_text("feature.yaml", SCENE_HEAD);
+    OwnedScene empty = scene_of_text("feature.yaml", SCENE_HEAD);
     settings.extra_features = FEATURE_CHECKERS;
     Film checkers = render(&empty, &settings);
     settings.extra_features = FEATURE_ALL;
-    Film general = render(&empty, &settings);
+    OwnedFilm general = render(&empty, &settings);
     same_and_freed(&checkers, &general, "checkers alone");
-    film_free(&general);
-    scene_free(&empty);
 }
 
 // With bands as short as they can be, each sample of a pixel has a separate launch.
 TEST(launches_of_samples_agree)
 {
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
-    Film one = render(&every_shape, &settings);
+    OwnedFilm one = render(&every_shape, &settings);
     settings.sample_count = 5;
     settings.band_seconds = 100;
-    Film expected = render(&every_shape, &settings);
+    OwnedFilm expected = render(&every_shape, &settings);
     settings.band_seconds = 1e-9;
     Film apart = render(&every_shape, &settings);
     same_and_freed(&apart, &expected, "5 samples in launches apart");
@@ -277,8 +270,6 @@ TEST(launches_of_samples_agree)
     for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++)
         difference += fabs(one.color[i] - expected.color[i]) / (3 * WIDTH * HEIGHT);
     assert_true(difference > 1e-4 && difference < 0.1);
-    film_free(&one);
-    film_free(&expected);
 }
 
 TEST(regions_are_cuts_of_the_whole)
@@ -288,7 +279,7 @@ TEST(regions_are_cuts_of_the_whole)
         {0, 13, WIDTH, 1},
     };
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
-    Film whole = render(&every_shape, &settings);
+    OwnedFilm whole = render(&every_shape, &settings);
     for (size_t i = 0; i < COUNT_OF(regions); i++) {
         const uint32_t *r = regions[i];
         settings.region_x = r[0];
@@ -301,7 +292,6 @@ TEST(regions_are_cuts_of_the_whole)
         same_and_freed(&part, &expected, what);
         film_free(&expected);
     }
-    film_free(&whole);
 }
 
 // A shifted frame shows a part of a larger frame around the view. The numbers are exact.
@@ -315,15 +305,13 @@ TEST(shifted_frames_are_cuts_of_a_larger_one)
         scene.camera.projection = i == 1 ? PROJECTION_ORTHOGRAPHIC : PROJECTION_PERSPECTIVE;
         scene.camera.half_tangent = i == 1 ? 4 : 0.5;
         settings.width = settings.height = settings.region_width = settings.region_height = 2 * SIDE;
-        Film whole = render(&scene, &settings), expected = film_cut(&whole, SIDE, 0, SIDE, SIDE);
+        OwnedFilm whole = render(&scene, &settings), expected = film_cut(&whole, SIDE, 0, SIDE, SIDE);
         scene.camera.half_tangent /= 2;
         scene.camera.shift[0] = scene.camera.shift[1] = 0.5;
         settings.width = settings.height = settings.region_width = settings.region_height = SIDE;
         Film shifted = render(&scene, &settings);
         same_and_freed(&shifted, &expected, i == 1 ? "shift of parallel rays" : "shift");
         scene.camera.shift[0] = scene.camera.shift[1] = 0;
-        film_free(&whole);
-        film_free(&expected);
     }
 }
 
@@ -332,7 +320,7 @@ static void check_sampled(const Scene *scene)
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.sample_count = 3;
     settings.lanes = 1;
-    Film expected = render(scene, &settings);
+    OwnedFilm expected = render(scene, &settings);
     assert_int_equal(film_count_faulty(&expected), 0);
     for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         if (*lanes == 1) continue;
@@ -355,7 +343,6 @@ static void check_sampled(const Scene *scene)
     Film part = render(scene, &settings), cut = film_cut(&expected, 13, 5, 31, 21);
     same_and_freed(&part, &cut, "region");
     film_free(&cut);
-    film_free(&expected);
 }
 
 // The points of areas are those of the pixel and the sample, wherever and whenever they are computed.
@@ -379,14 +366,13 @@ TEST(panoramas_agree)
     check_sampled(&panorama);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.bvh = BVH_OFF;
-    Film expected = render(&panorama, &settings);
+    OwnedFilm expected = render(&panorama, &settings);
     for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
         settings.lanes = *lanes;
         settings.bvh = BVH_ON;
         Film film = render(&panorama, &settings);
         same_and_freed(&film, &expected, "panorama with a BVH");
     }
-    film_free(&expected);
 }
 
 // Hard case R7 (docs/verify.md).
@@ -399,13 +385,11 @@ TEST(mirror_gives_the_mirrored_image)
             seen.camera.projection = mirrored.camera.projection =
                 width > WIDTH ? PROJECTION_EQUIRECTANGULAR : PROJECTION_PERSPECTIVE;
             RenderSettings settings = film_settings(width, HEIGHT, precision);
-            Film film = render(&seen, &settings), flipped = film_flipped(&film);
+            OwnedFilm film = render(&seen, &settings), flipped = film_flipped(&film);
             Film mirror = render(&mirrored, &settings);
             char what[64];
             snprintf(what, sizeof what, "%s, mirrored, %u wide", precision_names[settings.precision], width);
             same_and_freed(&mirror, &flipped, what);
-            film_free(&flipped);
-            film_free(&film);
         }
     }
     scene_free(&mirrored);
@@ -424,9 +408,8 @@ TEST(functions_stay_out_of_line)
         settings.extra_features = i == 0 ? 0 : FEATURE_ALL;
         Renderer *renderer = probe_renderer(&sampled, &settings);
         assert_non_null(renderer);
-        char *text = renderer_kernel_text(renderer);
+        OWNED char *text = renderer_kernel_text(renderer);
         assert_non_null(strstr(text, i == 0 ? "#define IS_OUT_OF_LINE 0" : "#define IS_OUT_OF_LINE 1"));
-        free(text);
         renderer_close(renderer);
     }
     probe_compute.device = device;
