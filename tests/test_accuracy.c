@@ -47,7 +47,7 @@ static AccuracyErrors compare(const Film *reference, const Film *variant)
     return errors;
 }
 
-TEST(test_edges)
+TEST(edges)
 {
     OwnedFilm film = film_make();
     AccuracyEdges edges;
@@ -75,7 +75,7 @@ TEST(test_edges)
     accuracy_edges_free(&edges);
 }
 
-TEST(test_equal)
+TEST(equal)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     AccuracyErrors errors = compare(&reference, &variant);
@@ -89,7 +89,7 @@ TEST(test_equal)
         assert_false(errors.worst[type].found);
 }
 
-TEST(test_wrong_objects)
+TEST(wrong_objects)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.object[at(5, 0)] = 1;
@@ -123,7 +123,7 @@ TEST(test_wrong_objects)
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
 }
 
-TEST(test_wrong_shadows)
+TEST(wrong_shadows)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
@@ -146,7 +146,7 @@ TEST(test_wrong_shadows)
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
 }
 
-TEST(test_wrong_paths)
+TEST(wrong_paths)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.path[at(6, 1)] = 1;
@@ -161,7 +161,7 @@ TEST(test_wrong_paths)
     assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
 }
 
-TEST(test_shading)
+TEST(shading)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.color[3 * at(0, 0)] += 0.25;
@@ -180,7 +180,7 @@ TEST(test_shading)
     assert_int_equal(errors.display.off_by_more, 3);
 }
 
-TEST(test_distances_and_normals)
+TEST(distances_and_normals)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
@@ -208,7 +208,7 @@ TEST(test_distances_and_normals)
     assert_true(isinf(errors.t_relative.largest) && isinf(errors.normal.largest));
 }
 
-TEST(test_unsound_pixels)
+TEST(unsound_pixels)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     variant.color[3 * at(3, 3)] = (double)NAN;
@@ -224,7 +224,7 @@ TEST(test_unsound_pixels)
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);
 }
 
-TEST(test_colors_only)
+TEST(colors_only)
 {
     OwnedFilm variant = film_make(), source = film_make();
     Film reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
@@ -239,7 +239,7 @@ TEST(test_colors_only)
 
 enum { VARIANTS = 5 };
 
-TEST(test_pareto_front_and_picks)
+TEST(pareto_front_and_picks)
 {
     // time of a frame, RMSE of the shading, leaks
     static const struct {

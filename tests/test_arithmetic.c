@@ -18,7 +18,7 @@ WITH_FMA static double multiply_add(double a, double b, double c)
     return a * b + c;
 }
 
-TEST(test_rounds_each_operation)
+TEST(rounds_each_operation)
 {
     assert_int_equal(FLT_EVAL_METHOD, 0);
     const volatile double large = 0x1p53, one = 1, near_one = 1 + 0x1p-30;
@@ -31,7 +31,7 @@ TEST(test_rounds_each_operation)
 }
 
 // Arguments at which glibc's function of doubles is off by one on x86-64, and the nearest doubles, by mpmath.
-TEST(test_functions_are_rounded_correctly)
+TEST(functions_are_rounded_correctly)
 {
     static const struct {
         double (*function)(double);
@@ -61,7 +61,7 @@ static void check_length(Vector3 v, double exact)
         fail_msg("length of %a %a %a: %a, not %a", v.x, v.y, v.z, vector_length(v), exact);
 }
 
-TEST(test_lengths_neither_overflow_nor_underflow)
+TEST(lengths_neither_overflow_nor_underflow)
 {
     for (int exponent = -1070; exponent <= 1020; exponent++)
         check_length((Vector3){ldexp(2, exponent), ldexp(-3, exponent), ldexp(6, exponent)},
@@ -70,7 +70,7 @@ TEST(test_lengths_neither_overflow_nor_underflow)
     assert_true(vector_length((Vector3){0}) == 0);
 }
 
-TEST(test_quad_has_its_bits)
+TEST(quad_has_its_bits)
 {
     Quad last = 1;
     for (int bit = 1; bit < QUAD_BITS; bit++)
@@ -83,7 +83,7 @@ TEST(test_quad_has_its_bits)
 }
 
 // Squares of integers have exact roots, even far outside the range of a double.
-TEST(test_quad_roots)
+TEST(quad_roots)
 {
     Random random = {.state = 1};
     Quad scale = 1;
@@ -105,7 +105,7 @@ TEST(test_quad_roots)
 }
 
 // An image's texel is the same float whatever the last bits of the C library's pow.
-TEST(test_decoded_texels_do_not_depend_on_pow)
+TEST(decoded_texels_do_not_depend_on_pow)
 {
     for (uint32_t maximum = 255; maximum <= 65535; maximum += 65280) {
         for (uint32_t k = 0; k <= maximum; k++) {

@@ -44,7 +44,7 @@ static void check_message(const char *bytes, size_t offset, const char *expected
     assert_string_equal(text, expected);
 }
 
-TEST(test_message_place)
+TEST(message_place)
 {
     check_message("one\ntwo three\n", 8, "a.yaml:2:5: error: bad word\ntwo three\n    ^\n");
     check_message("one", 0, "a.yaml:1:1: error: bad word\none\n^\n");
@@ -56,7 +56,7 @@ TEST(test_message_place)
     check_message("\xEF\xBB\xBFone", 4, "a.yaml:1:2: error: bad word\none\n ^\n");
 }
 
-TEST(test_message_characters)
+TEST(message_characters)
 {
     check_message("\ta\tb", 3, "a.yaml:1:4: error: bad word\n\ta\tb\n\t \t^\n");
     check_message("\xC3\xA9\xE2\x98\x83x", 5, "a.yaml:1:3: error: bad word\n\xC3\xA9\xE2\x98\x83x\n  ^\n");
@@ -64,7 +64,7 @@ TEST(test_message_characters)
     check_message("\xED\xA0\x80\xC0\xAF.", 5, "a.yaml:1:6: error: bad word\n?????.\n     ^\n");
 }
 
-TEST(test_message_long_line)
+TEST(message_long_line)
 {
     char line[1001];
     memset(line, 'a', 1000);
@@ -75,7 +75,7 @@ TEST(test_message_long_line)
     check_message(line, 0, expected);
 }
 
-TEST(test_message_without_place)
+TEST(message_without_place)
 {
     MessageList messages = {0};
     message_warning(&messages, "one\n%d\x1B", 2);
@@ -88,7 +88,7 @@ TEST(test_message_without_place)
     assert_int_equal(messages.count, 0);
 }
 
-TEST(test_text)
+TEST(text_grows)
 {
     Text text = {0};
     assert_string_equal(text_c(&text), "");
@@ -102,7 +102,7 @@ TEST(test_text)
     assert_null(text.items);
 }
 
-TEST(test_text_quantities)
+TEST(text_quantities)
 {
     static const struct {
         double value;
@@ -126,7 +126,7 @@ TEST(test_text_quantities)
     assert_string_equal(text_plural(1), "");
 }
 
-TEST(test_text_character_size)
+TEST(characters_have_sizes)
 {
     assert_int_equal(text_character_size("a", 1), 1);
     assert_int_equal(text_character_size("\xC3\xA9", 2), 2);
@@ -138,7 +138,7 @@ TEST(test_text_character_size)
     assert_int_equal(text_character_size("", 0), 0);
 }
 
-TEST(test_text_nearest)
+TEST(nearest_text)
 {
     const char *const known[] = {"radius", "center", "material", "color", "up", "angle"};
     const size_t count = COUNT_OF(known);
@@ -156,7 +156,7 @@ TEST(test_text_nearest)
     assert_null(text_nearest("radius", known, 0));
 }
 
-TEST(test_array)
+TEST(array)
 {
     ARRAY_OF(uint64_t) numbers = {0};
     for (uint64_t i = 0; i < 5000; i++)
@@ -168,7 +168,7 @@ TEST(test_array)
     free(numbers.items);
 }
 
-TEST(test_read_failures)
+TEST(read_failures)
 {
     MessageList messages = {0};
     OwnedText text = {0};
@@ -215,7 +215,7 @@ int fsync(int descriptor) // NOLINT(readability-inconsistent-declaration-paramet
     return -1;
 }
 
-TEST(test_output_commit)
+TEST(committed_output)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -240,7 +240,7 @@ static void output_write_new(OutputFile *output, const char *path, MessageList *
     assert_true(output_write(output, "new", 3, messages));
 }
 
-TEST(test_output_replaces_what_a_link_leads_to)
+TEST(output_replaces_what_a_link_leads_to)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -260,7 +260,7 @@ TEST(test_output_replaces_what_a_link_leads_to)
 }
 
 // Relative to the folder of each link on the way.
-TEST(test_output_makes_what_a_link_leads_to)
+TEST(output_makes_what_a_link_leads_to)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -286,7 +286,7 @@ TEST(test_output_makes_what_a_link_leads_to)
     rmdir("folder");
 }
 
-TEST(test_output_where_there_are_no_modes)
+TEST(output_where_there_are_no_modes)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -301,7 +301,7 @@ TEST(test_output_where_there_are_no_modes)
     unlink("new");
 }
 
-TEST(test_output_finish)
+TEST(finished_output)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -324,7 +324,7 @@ TEST(test_output_finish)
     unlink("kept");
 }
 
-TEST(test_output_failures)
+TEST(output_failures)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -344,7 +344,7 @@ TEST(test_output_failures)
     assert_true(output_commit(&output, &messages));
 }
 
-TEST(test_output_abandon)
+TEST(abandoned_output)
 {
     MessageList messages = {0};
     OutputFile output;
@@ -390,7 +390,7 @@ static void output_in_ended_process(EndedWhile ended_while)
 
 // A process that is killed while it writes leaves nothing if files need no name. Otherwise the next process
 // removes what it left, but not the files of a living process.
-TEST(test_output_of_killed_processes)
+TEST(output_of_killed_processes)
 {
     MessageList messages = {0};
     OutputFile living, output;
@@ -419,7 +419,7 @@ TEST(test_output_of_killed_processes)
 
 // A process that faults while a named temporary is half written exits with status 2 and leaves the old file
 // whole and nothing next to it.
-TEST(test_fault_removes_the_temporary)
+TEST(fault_removes_the_temporary)
 {
     file_write("kept", "old");
     output_in_ended_process(FAULTING);
@@ -434,7 +434,7 @@ static void product_wrap(void *unused)
 }
 
 // A product that wraps would make an allocation that is too small.
-TEST(test_products_do_not_wrap)
+TEST(products_do_not_wrap)
 {
     assert_int_equal(memory_product(3, 5), 15);
     assert_int_equal(memory_product(0, SIZE_MAX), 0);
@@ -443,7 +443,7 @@ TEST(test_products_do_not_wrap)
 }
 
 // Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
-TEST(test_hash)
+TEST(hash)
 {
     assert_true(hash_bytes(HASH_START, "", 0) == UINT64_C(0xcbf29ce484222325));
     assert_true(hash_bytes(HASH_START, "a", 1) == UINT64_C(0xaf63dc4c8601ec8c));
@@ -452,7 +452,7 @@ TEST(test_hash)
 }
 
 // RFC 4648, section 10.
-TEST(test_base64)
+TEST(base64)
 {
     static const char *const cases[][2] = {
         {"", ""},
@@ -483,7 +483,7 @@ static void stage_check(Stage *stage, const char *expected)
     if (expected[0]) assert_true(seconds >= 0);
 }
 
-TEST(test_stage)
+TEST(stages)
 {
     Stage *stage = stage_open(true);
     stage_check(stage, "");

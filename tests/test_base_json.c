@@ -39,7 +39,7 @@ static void check_key(const char *key, const char *expected)
     assert_string_equal(printed, whole);
 }
 
-TEST(test_text_that_looks_like_something_else)
+TEST(text_that_looks_like_something_else)
 {
     check_text("yes", "\"yes\"");
     check_text("123", "\"123\"");
@@ -58,7 +58,7 @@ TEST(test_text_that_looks_like_something_else)
     check_text("'a'", "\"'a'\"");
 }
 
-TEST(test_keys)
+TEST(keys)
 {
     check_key("123", "\"123\"");
     check_key("true", "\"true\"");
@@ -68,7 +68,7 @@ TEST(test_keys)
     check_key("\xC3\xA9", "\"\xC3\xA9\"");
 }
 
-TEST(test_spaces)
+TEST(spaces)
 {
     check_text(" ", "\" \"");
     check_text("  a  b   ", "\"  a  b   \"");
@@ -76,7 +76,7 @@ TEST(test_spaces)
     check_text(" \"a", "\" \\\"a\"");
 }
 
-TEST(test_escapes)
+TEST(escapes)
 {
     check_text("a\"b\\c/", "\"a\\\"b\\\\c/\"");
     check_text("\n\t\r", "\"\\n\\t\\r\"");
@@ -88,7 +88,7 @@ TEST(test_escapes)
 
 #define REPLACED "\xEF\xBF\xBD" // U+FFFD
 
-TEST(test_utf8)
+TEST(utf8)
 {
     check_text("\xC3\xA9\xE2\x98\x83", "\"\xC3\xA9\xE2\x98\x83\"");
     check_text("\xF0\x9F\x98\x80", "\"\xF0\x9F\x98\x80\"");
@@ -100,7 +100,7 @@ TEST(test_utf8)
     check_text(" \xFF ", "\" " REPLACED " \"");
 }
 
-TEST(test_long_text_stays_on_its_line)
+TEST(long_text_stays_on_its_line)
 {
     char value[4001], expected[4003];
     for (size_t i = 0; i < 4000; i++)
@@ -123,7 +123,7 @@ static double number_back(double value)
     return back;
 }
 
-TEST(test_numbers_read_back)
+TEST(numbers_read_back)
 {
     const double values[] = {0,    1,       0.1,     1.0 / 3,      1e20, 1e300, 123456789012345678.0,
                              1e-7, DBL_MAX, DBL_MIN, DBL_TRUE_MIN, -2.5, 5e-5,  16777217};
@@ -132,7 +132,7 @@ TEST(test_numbers_read_back)
     assert_true(signbit(number_back(-0.0)));
 }
 
-TEST(test_number_words)
+TEST(number_words)
 {
     Json *json = json_open();
     json_begin_array(json, "all");
@@ -170,7 +170,7 @@ TEST(test_number_words)
                                  "}\n");
 }
 
-TEST(test_nesting)
+TEST(nesting)
 {
     Json *json = json_open();
     json_begin_object(json, "empty");
@@ -207,7 +207,7 @@ TEST(test_nesting)
     free(printed);
 }
 
-TEST(test_deep_nesting)
+TEST(deep_nesting)
 {
     enum { DEPTH = 1000 };
     Json *json = json_open();
@@ -242,7 +242,7 @@ static void text_write(void *left)
     *(long *)left = allocations_left;
 }
 
-TEST(test_without_memory)
+TEST(without_memory)
 {
     long left = 0, failed = 0;
     ChildEnd end = child_run(text_write, &left, sizeof left);

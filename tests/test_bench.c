@@ -14,7 +14,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-TEST(test_quantiles)
+TEST(quantiles)
 {
     Series series = {0};
     assert_int_equal(series_summarize(&series).count, 0);
@@ -58,7 +58,7 @@ static BenchTimes times_make(size_t runs, double rate)
     return times;
 }
 
-TEST(test_events_that_agree)
+TEST(events_that_agree)
 {
     OwnedBenchTimes times = times_make(30, 1.001);
     assert_null(bench_clock_fault(&times));
@@ -69,7 +69,7 @@ TEST(test_events_that_agree)
     assert_false(bench_converged(&times, 31));
 }
 
-TEST(test_clock_that_drifts)
+TEST(clock_that_drifts)
 {
     BenchTimes times = times_make(30, 1.02);
     assert_non_null(bench_clock_fault(&times));
@@ -84,7 +84,7 @@ TEST(test_clock_that_drifts)
 }
 
 // The device's clock is not blamed if the host learns late of a launch. A clock that drifts is.
-TEST(test_stalled_launches)
+TEST(stalled_launches)
 {
     enum { LAUNCHES = 20 };
     static const double rates[] = {1, 1.009, 0.991, 1.02, 0.98};
@@ -102,7 +102,7 @@ TEST(test_stalled_launches)
 }
 
 // One event that cannot be trusted makes the whole row use the host's clock.
-TEST(test_event_without_times)
+TEST(event_without_times)
 {
     OwnedBenchTimes times = times_make(30, 1);
     LaunchTime zeros = {.host_seconds = 0.030, .host_start_seconds = 9};
@@ -128,7 +128,7 @@ static Verdict drift_verdict(bool is_cpu, int run_count, double part, double lau
     return drift.verdict;
 }
 
-TEST(test_drift)
+TEST(drift)
 {
     enum { RUNS = 90, FEW = 20 };
     for (int percent = 20; percent <= 80; percent += 20) {
@@ -142,7 +142,7 @@ TEST(test_drift)
     assert_int_equal(bench_drift(&(BenchTimes){0}, true, 1).verdict, VERDICT_UNDECIDED);
 }
 
-TEST(test_runs_that_scatter)
+TEST(runs_that_scatter)
 {
     OwnedBenchTimes times = {0};
     for (int i = 0; i < 40; i++) {
@@ -163,7 +163,7 @@ static BenchRow row_make(void)
     return row;
 }
 
-TEST(test_figures)
+TEST(figures)
 {
     BenchRow row = row_make();
     assert_near(bench_rays_per_second(&row), (1200 + 100 + 200 + 1500) / 0.030, 1e-3);
@@ -211,7 +211,7 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
 // The start of a report.
 #define BASELINE_HEAD "{\"schema\": 6, \"calibration\": {\"rounds\": 1048576}, "
 
-TEST(test_baseline)
+TEST(baseline)
 {
     size_t errors;
     Baseline *baseline =
@@ -255,7 +255,7 @@ static void check_refused(const char *text)
     assert_int_equal(errors, 1);
 }
 
-TEST(test_broken_baselines)
+TEST(broken_baselines)
 {
     BenchRow row = row_make();
     const char *refused[] = {"",
@@ -321,7 +321,7 @@ static void baseline_read(void *left)
     *(long *)left = allocations_left;
 }
 
-TEST(test_baseline_without_memory)
+TEST(baseline_without_memory)
 {
     long left = 0, failed = 0;
     ChildEnd end = child_run(baseline_read, &left, sizeof left);

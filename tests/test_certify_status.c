@@ -73,7 +73,7 @@ static void certify(void *context)
     exit(status);
 }
 
-TEST(test_status)
+TEST(status)
 {
     const Case fails[] = {{"single,certified", AN_OBJECT, 0}, {"certified", A_COLOR, 0}};
     const Case mirrored[] = {{"certified", THE_CHECKER, 0}, {"certified", A_SHADOW, 0}};

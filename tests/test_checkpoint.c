@@ -112,7 +112,7 @@ static size_t file_size(void)
     return (size_t)status.st_size;
 }
 
-TEST(test_bands_are_read_again)
+TEST(bands_are_read_again)
 {
     Text bytes = file_make();
     text_free(&bytes);
@@ -125,7 +125,7 @@ TEST(test_bands_are_read_again)
 }
 
 // If the file is cut off at any byte, it has the bands before that byte, and a render resumes from them.
-TEST(test_torn_writes)
+TEST(torn_writes)
 {
     OwnedText bytes = file_make();
     size_t header_size, kept = 0;
@@ -150,7 +150,7 @@ TEST(test_torn_writes)
 }
 
 // A wrong byte ends the bands that are used.
-TEST(test_wrong_bytes)
+TEST(wrong_bytes)
 {
     OwnedText bytes = file_make();
     unlink(path);
@@ -174,7 +174,7 @@ static void append_film(const Film *band)
 }
 
 // Whole records that do not fit the image are not used.
-TEST(test_other_sizes)
+TEST(other_sizes)
 {
     Values values;
     const Film right = band_make(&values, ROWS - BAND_ROWS);
@@ -217,7 +217,7 @@ static void refused(const char *other_key, const char *reason)
     assert_memory_equal(before.items, after.items, before.count);
 }
 
-TEST(test_refusals)
+TEST(refusals)
 {
     OwnedText bytes = file_make();
     unlink(path);
@@ -249,7 +249,7 @@ TEST(test_refusals)
 }
 
 // A symbolic link stays. The file behind it is removed, and the next render creates it.
-TEST(test_symbolic_links)
+TEST(symbolic_links)
 {
     char file[80];
     snprintf(file, sizeof file, "%s-file", path);
@@ -278,7 +278,7 @@ int __wrap_unlink(const char *name)
     return removal_fails ? -1 : __real_unlink(name);
 }
 
-TEST(test_a_file_that_stays)
+TEST(a_file_that_stays)
 {
     Checkpoint *checkpoint = open_checked();
     OwnedMessageList messages = {0};
@@ -303,7 +303,7 @@ int __wrap_flock(int descriptor, int operation)
     return __real_flock(descriptor, operation);
 }
 
-TEST(test_a_file_removed_before_the_lock)
+TEST(a_file_removed_before_the_lock)
 {
     unlink(path);
     file_is_removed = true;
@@ -333,7 +333,7 @@ static bool band_sink(void *context, const Film *band)
 }
 
 // Only missing bands are handed out, and all reach the sink in order.
-TEST(test_a_render_resumes)
+TEST(a_render_resumes)
 {
     for (unsigned done = 0; done < 1 << BANDS; done++) {
         unlink(path);

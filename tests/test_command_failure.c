@@ -57,7 +57,7 @@ static void assert_prints(const ChildEnd *end, const char *expected)
     assert_non_null(strstr(end->errors, expected));
 }
 
-TEST(test_commands)
+TEST(commands)
 {
     static const Command commands[] = {
         {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", "/dev/null/none.png"}},
@@ -89,7 +89,7 @@ static void assert_same_bytes(const char *one, const char *other)
 
 // If one of two devices fails, or the scene does not fit it, there is a warning and the same image. If both
 // fail, or the scene does not fit a device that was named, there is an error.
-TEST(test_several_devices)
+TEST(several_devices)
 {
     static const char pocl[] = "/etc/OpenCL/vendors/pocl.icd";
     if (access(pocl, R_OK) != 0) skip();
@@ -135,7 +135,7 @@ TEST(test_several_devices)
 }
 
 // A complete image is written whatever a release returns.
-TEST(test_release_after_the_output)
+TEST(release_after_the_output)
 {
     char path[] = "/tmp/glint-test-XXXXXX.png";
     assert_true(close(mkstemps(path, 4)) == 0);
@@ -152,7 +152,7 @@ TEST(test_release_after_the_output)
 }
 
 // A driver that crashes is named with its call. If the output is complete, this is a warning.
-TEST(test_crashes)
+TEST(crashes)
 {
 #ifdef __SANITIZE_ADDRESS__
     skip(); // sanitizers handle crashes

@@ -111,7 +111,7 @@ static Verdict reports_simulate(Machine old_machine, Machine new_machine, double
 }
 
 // The estimate of a report with few runs is that of their medians, and undecided.
-TEST(test_reports_of_few_runs)
+TEST(reports_of_few_runs)
 {
     Series old_frame = {0}, new_frame = {0}, calibration = {0};
     for (int i = 0; i < 5; i++) {
@@ -177,7 +177,7 @@ static void counts_print(const char *what, Counts counts)
 enum { TRIES = 1000 };
 
 // False alarms are at most 1 % whatever the machine.
-TEST(test_same_build_against_itself)
+TEST(same_build_against_itself)
 {
     const Machine *machines[] = {&quiet, &busy, &hopeless};
     for (int i = 0; i < 3; i++) {
@@ -189,7 +189,7 @@ TEST(test_same_build_against_itself)
     }
 }
 
-TEST(test_slower_build_is_found)
+TEST(slower_build_is_found)
 {
     Counts slower = against_count(quiet, 1.05, TRIES), faster = against_count(quiet, 1 / 1.05, TRIES),
            noisy = against_count(busy, 1.05, TRIES);
@@ -203,7 +203,7 @@ TEST(test_slower_build_is_found)
 }
 
 // Reports on a quiet and on a busy or slower machine give no false alarm, but no claim either.
-TEST(test_reports_of_one_build)
+TEST(reports_of_one_build)
 {
     Machine slow = quiet, thermal = quiet;
     slow.speed = log(1.4);
@@ -224,7 +224,7 @@ TEST(test_reports_of_one_build)
     }
 }
 
-TEST(test_reports_of_a_slower_build)
+TEST(reports_of_a_slower_build)
 {
     Counts counts = reports_count(quiet, quiet, 1.2, TRIES);
     counts_print("reports: quiet, 20 % slower", counts);
@@ -232,7 +232,7 @@ TEST(test_reports_of_a_slower_build)
 }
 
 // Rows of one process tie unless one is slower, and no few runs tell.
-TEST(test_rows_of_one_process)
+TEST(rows_of_one_process)
 {
     const struct {
         const char *what;
@@ -262,7 +262,7 @@ TEST(test_rows_of_one_process)
 }
 
 // The ends are the order statistics that the binomial distribution gives, worked out by hand.
-TEST(test_rows)
+TEST(rows)
 {
     static const struct {
         Verdict frame, processor, row;
@@ -282,7 +282,7 @@ TEST(test_rows)
         assert_int_equal(verdict_of_row(rows[i].frame, rows[i].processor), rows[i].row);
 }
 
-TEST(test_intervals)
+TEST(intervals)
 {
     // 2 / 2^9 <= 0.01 / 2 < 2 / 2^8, and each further look takes twice as many
     assert_int_equal(comparison_pairs_at_look(0, 1), 9);

@@ -8,7 +8,7 @@
 #include "tests/scene_reading.h"
 #include <math.h>
 
-TEST(test_days)
+TEST(days)
 {
     assert_true(days_from_epoch(2000, 1, 1) == -0.5);
     // Meeus, Astronomical algorithms, 1998, chapter 7: Julian days of examples
@@ -26,7 +26,7 @@ static void check_sun(double latitude, double longitude, double days, double ele
 }
 
 // Published places of the sun, with refraction.
-TEST(test_sun_position)
+TEST(positions_of_the_sun)
 {
     // Reda, Andreas, Solar position algorithm for solar radiation applications, NREL/TP-560-34302, 2008, A.5
     const double reda = days_from_epoch(2003, 10, 17) + (19 + 30.5 / 60) / 24;
@@ -39,7 +39,7 @@ TEST(test_sun_position)
     assert_near(pole.elevation, 29 / 60.0, 0.03);
 }
 
-TEST(test_exponential)
+TEST(exponential)
 {
     for (int i = -2000; i <= 2000; i++) {
         const double value = i * 0.35;
@@ -49,7 +49,7 @@ TEST(test_exponential)
     assert_true(portable_exponential(0) == 1 && portable_exponential(-1e9) == 0);
 }
 
-TEST(test_sun_color)
+TEST(colors_of_the_sun)
 {
     Color before = sun_color(90, 3);
     assert_true(vector_largest(before) > 1 && vector_largest(before) < 1.3);
@@ -69,7 +69,7 @@ static const float *texel_at(const Image *image, uint32_t x, uint32_t y)
     return image->values + 3 * ((size_t)y * image->width + x);
 }
 
-TEST(test_sky)
+TEST(sky)
 {
     uint64_t hash = HASH_START;
     static const double elevations[] = {90, 20, 3, -6};
@@ -99,7 +99,7 @@ static void check_texel(const Image *image, uint32_t x, uint32_t y, double red, 
 }
 
 // Expected is what the model's formulas give in numpy.
-TEST(test_sky_values)
+TEST(sky_values)
 {
     OwnedImage noon = daylight_image(60, 4.5, vector_all(0)), evening = daylight_image(3, 4.5, vector_all(0));
     check_texel(&noon, 255, 0, 0.369279, 0.532920, 0.907717);
@@ -109,7 +109,7 @@ TEST(test_sky_values)
 }
 
 // The brightest texel above the horizon is the sun's, or the one next to it.
-TEST(test_sky_is_brightest_at_the_sun)
+TEST(sky_is_brightest_at_the_sun)
 {
     static const double elevations[] = {60, 20, 3};
     for (size_t i = 0; i < 3; i++) {
@@ -131,7 +131,7 @@ static double redness(double elevation, uint32_t degrees)
     return red;
 }
 
-TEST(test_sky_colors)
+TEST(sky_colors)
 {
     assert_true(redness(3, 1) > 3 && redness(3, 1) > 2 * redness(20, 1) && redness(20, 1) > redness(60, 1));
     assert_true(redness(60, 45) < 0.8); // blue at noon
@@ -153,7 +153,7 @@ static Scene scene_of_background(const char *background)
 }
 
 // The values in the file reach the light, the image and the ambient light.
-TEST(test_scene)
+TEST(scene)
 {
     Scene scene = scene_of_background("{sun: {elevation: 30, azimuth: 90}, intensity: 2, turbidity: 5}");
     assert_int_equal(scene.lights.count, 1);
@@ -190,7 +190,7 @@ TEST(test_scene)
 }
 
 // Seen from above, with north at the top, the shadow of a post points away from the sun.
-TEST(test_shadow)
+TEST(shadow)
 {
     OwnedScene scene = scene_of_text(
         "post.yaml", "camera: {position: [0, 40, 0], look_at: [0, 0, 0], up: [0, 0, -1], fov: 12}\n"

@@ -74,7 +74,7 @@ static void pair_close(Compute computes[2])
 }
 
 // One of two devices fails, at each call of its first band in turn. The other renders the whole image.
-TEST(test_one_of_two_devices)
+TEST(one_of_two_devices)
 {
     static const char *const needed[] = {
         "clCreateBuffer",     "clSetKernelArg", "clEnqueueWriteBuffer",   "clEnqueueReadBuffer",
@@ -113,7 +113,7 @@ TEST(test_one_of_two_devices)
 }
 
 // The second device gets no thread, and the first renders the whole image.
-TEST(test_a_device_without_a_thread)
+TEST(a_device_without_a_thread)
 {
     Compute computes[2];
     Answer answer;
@@ -129,7 +129,7 @@ TEST(test_a_device_without_a_thread)
     pair_close(computes);
 }
 
-TEST(test_both_of_two_devices)
+TEST(both_of_two_devices)
 {
     Compute computes[2];
     Answer answer;

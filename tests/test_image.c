@@ -77,7 +77,7 @@ static void check_display_round_trip(const char *path, uint32_t channels, Transf
         assert_true(image.values[i] == (float)image_quantize(values[i], transfer, bits) / maximum);
 }
 
-TEST(test_display_formats)
+TEST(display_formats)
 {
     const char *const paths[] = {"a.png", "a.ppm"};
     for (size_t i = 0; i < 2; i++) {
@@ -107,7 +107,7 @@ static void check_float_round_trip(const char *path, uint32_t channels)
     assert_memory_equal(image.values, values, count * sizeof *values);
 }
 
-TEST(test_float_formats)
+TEST(float_formats)
 {
     check_float_round_trip("a.exr", 1);
     check_float_round_trip("a.exr", 3);
@@ -117,7 +117,7 @@ TEST(test_float_formats)
 }
 
 // The library reads ahead of a header, so a file shorter than that must be read as whole.
-TEST(test_small_exr)
+TEST(small_exr)
 {
     const float value = 0.375F;
     ImageHeader header = {IMAGE_EXR, 1, 1, 1, TRANSFER_SRGB, 8, 'f', NULL};
@@ -126,7 +126,7 @@ TEST(test_small_exr)
     assert_true(image.width == 1 && image.height == 1 && image.channels == 1 && image.values[0] == value);
 }
 
-TEST(test_npy_types)
+TEST(npy_types)
 {
     const uint32_t integers[] = {0, 1, 7, 16777217, 4294967295U, 5};
     ImageHeader header = {IMAGE_NPY, 3, 2, 1, TRANSFER_NONE, 8, 'u', NULL};
@@ -146,7 +146,7 @@ TEST(test_npy_types)
     image_free(&image);
 }
 
-TEST(test_doubles_keep_their_bits)
+TEST(doubles_keep_their_bits)
 {
     const double doubles[] = {1.0 / 3, 1 + 1e-15, 5e-324};
     const float floats[] = {1.0F / 3, 1, 0.5F};
@@ -161,7 +161,7 @@ TEST(test_doubles_keep_their_bits)
     }
 }
 
-TEST(test_npy_bytes)
+TEST(npy_bytes)
 {
     const float value = 1.5F;
     ImageHeader header = {IMAGE_NPY, 1, 1, 1, TRANSFER_NONE, 8, 'f', NULL};
@@ -179,7 +179,7 @@ TEST(test_npy_bytes)
 }
 
 // The chunks in front of the pixels, as libpng sees them.
-TEST(test_png_notes)
+TEST(png_notes)
 {
     ImageHeader header = {IMAGE_PNG, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     OWNED float *values = values_make(60);
@@ -204,7 +204,7 @@ TEST(test_png_notes)
     fclose(file);
 }
 
-TEST(test_exr_notes)
+TEST(exr_notes)
 {
     ImageHeader header = {IMAGE_EXR, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     OWNED float *values = values_make(60);
@@ -240,7 +240,7 @@ static ImageWriter *writer_of_8_by_40(const char *path, MessageList *messages)
     return writer;
 }
 
-TEST(test_abandoned_leaves_the_old_file)
+TEST(abandoned_leaves_the_old_file)
 {
     OWNED float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
@@ -258,7 +258,7 @@ TEST(test_abandoned_leaves_the_old_file)
 }
 
 // Every write to /dev/full fails as on a full disk; enough rows that no buffer holds them all.
-TEST(test_disk_full)
+TEST(disk_full)
 {
     enum { SIDE = 256 };
     OWNED float *values = values_make(SIDE * SIDE * 3);
@@ -277,7 +277,7 @@ TEST(test_disk_full)
     }
 }
 
-TEST(test_finished_is_yet_to_be_renamed)
+TEST(finished_is_yet_to_be_renamed)
 {
     OWNED float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
@@ -359,7 +359,7 @@ static void check_layer(const char *layer, const void *expected, uint32_t channe
     }
 }
 
-TEST(test_exr_layers)
+TEST(exr_layers)
 {
     enum { PIXELS = 4 * 33 };
     OWNED float *color = values_make(3 * PIXELS), *vectors = values_make(3 * PIXELS),
@@ -397,7 +397,7 @@ TEST(test_exr_layers)
     assert_false(image_read(&image, "layers.exr", &(ImageReadOptions){.layer = "mask"}, &messages));
 }
 
-TEST(test_png_of_other_colors)
+TEST(png_of_other_colors)
 {
     static const double rec_709[] = {0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06};
     static const double adobe[] = {0.3127, 0.329, 0.64, 0.33, 0.21, 0.71, 0.15, 0.06};
@@ -441,7 +441,7 @@ static void jpeg_write(const char *path, const char *segments, size_t length, in
     tjDestroy(encoder);
 }
 
-TEST(test_jpeg_is_turned_upright)
+TEST(jpeg_is_turned_upright)
 {
     // quarters in reading order, as the orientation's place of row 0 and column 0 has them
     static const int quarters[9][4] = {{0},          {0, 1, 2, 3}, {1, 0, 3, 2}, {3, 2, 1, 0}, {2, 3, 0, 1},
@@ -467,7 +467,7 @@ TEST(test_jpeg_is_turned_upright)
     }
 }
 
-TEST(test_jpeg_of_other_colors)
+TEST(jpeg_of_other_colors)
 {
     static const char p3[] = "\xFF\xE2\0\x1A"
                              "ICC_PROFILE\0\1\1Display P3",
@@ -485,7 +485,7 @@ TEST(test_jpeg_of_other_colors)
                                   "convert the image to RGB");
 }
 
-TEST(test_folder_that_is_not_there)
+TEST(folder_that_is_not_there)
 {
     MessageList messages = {0};
     ImageHeader header = {IMAGE_PNG, 8, 8, 3, TRANSFER_SRGB, 8, 'f', NULL};
@@ -493,7 +493,7 @@ TEST(test_folder_that_is_not_there)
     check_only_message(&messages, "cannot create 'nowhere/a.png': No such file or directory");
 }
 
-TEST(test_format_by_ending)
+TEST(format_by_ending)
 {
     assert_int_equal(image_format_of("a.b/c.PNG"), IMAGE_PNG);
     assert_int_equal(image_format_of("c.ppm"), IMAGE_PPM);
@@ -515,7 +515,7 @@ static void check_refused(const char *bytes, size_t length, const char *reason)
 
 #define CHECK_REFUSED(bytes, reason) check_refused(bytes, sizeof(bytes) - 1, reason)
 
-TEST(test_bad_files)
+TEST(bad_files)
 {
     CHECK_REFUSED("", "neither PNG, JPEG, PPM, EXR nor NPY");
     CHECK_REFUSED("hello", "neither PNG, JPEG, PPM, EXR nor NPY");
@@ -549,7 +549,7 @@ static long peak_kibibytes(void)
 
 // The file is refused before anything of the declared size is allocated. One of its rows alone would be 300
 // MB.
-TEST(test_png_that_declares_too_much)
+TEST(png_that_declares_too_much)
 {
     long before = peak_kibibytes();
     CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
@@ -561,7 +561,7 @@ TEST(test_png_that_declares_too_much)
 }
 
 // The size that a note declares, here 1.8 GB, is never allocated.
-TEST(test_png_with_a_large_note)
+TEST(png_with_a_large_note)
 {
     long before = peak_kibibytes();
     CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
@@ -573,7 +573,7 @@ TEST(test_png_with_a_large_note)
 }
 
 // 2 x 2 pixels are fewer than 5, 3 x 2 are not.
-TEST(test_pixels_are_limited)
+TEST(pixels_are_limited)
 {
     const ImageReadOptions options = {.max_pixels = 5};
     file_write_bytes("small.ppm", "P6 2 2 255 123456789abc", 23);
@@ -590,7 +590,7 @@ TEST(test_pixels_are_limited)
     unlink("large.ppm");
 }
 
-TEST(test_text_pixmap)
+TEST(text_pixmap)
 {
     const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
     file_write_bytes("text.ppm", bytes, sizeof bytes - 1);

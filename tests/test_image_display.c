@@ -20,7 +20,7 @@ static uint8_t shown(float value, const ImageHeader *settings)
 }
 
 // The curve's values are those of Python's fractions, rounded to 10 digits.
-TEST(test_filmic_curve)
+TEST(filmic_curve)
 {
     static const double points[][2] = {{0, 0},
                                        {0.01, 0.0037702798},
@@ -39,7 +39,7 @@ TEST(test_filmic_curve)
 }
 
 // A stop doubles the light before the curve.
-TEST(test_exposure)
+TEST(exposure)
 {
     for (int tone = TONE_NONE; tone < TONE_COUNT; tone++)
         for (int i = 0; i < 400; i++) {
@@ -66,7 +66,7 @@ static void block_show(uint8_t bytes[SIDE * SIDE], float value, Transfer transfe
 
 // A block's mean is the exact display value to 1/64 of a step, or half a step of 16 bits, and it has two
 // neighboring values at most.
-TEST(test_dither_keeps_the_mean)
+TEST(dither_keeps_the_mean)
 {
     uint8_t bytes[SIDE * SIDE];
     for (int k = 0; k <= 1400; k++) {
@@ -83,7 +83,7 @@ TEST(test_dither_keeps_the_mean)
     }
 }
 
-TEST(test_dither_keeps_exact_values)
+TEST(dither_keeps_exact_values)
 {
     uint8_t bytes[SIDE * SIDE];
     for (int k = 0; k <= 255; k++) {
@@ -98,7 +98,7 @@ TEST(test_dither_keeps_exact_values)
 }
 
 // The pixels of half a step form a checkerboard, and those of a quarter every other one of its dark fields.
-TEST(test_dither_spreads)
+TEST(dither_spreads)
 {
     uint8_t half[SIDE * SIDE], quarter[SIDE * SIDE];
     block_show(half, 100.5F / 255, TRANSFER_NONE, true);
@@ -138,7 +138,7 @@ static void part_write(const char *path, uint32_t left, uint32_t top, uint32_t w
 }
 
 // The pattern lies in the whole image, so that a region, and bands, have the bits of the whole.
-TEST_WITH(test_regions_and_bands, folder_open, folder_close)
+TEST_WITH(regions_and_bands, folder_open, folder_close)
 {
     part_write("whole.ppm", 0, 0, 32, 32);
     part_write("part.ppm", 5, 11, 20, 9);
@@ -150,7 +150,7 @@ TEST_WITH(test_regions_and_bands, folder_open, folder_close)
 }
 
 // Many rows at once, which threads share, have the same bytes as rows written one by one.
-TEST(test_rows_at_once)
+TEST(rows_at_once)
 {
     enum { ROWS = 300, COLUMNS = 700 };
     static float values[ROWS * COLUMNS * 3];

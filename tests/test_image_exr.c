@@ -159,7 +159,7 @@ static void check_refused(const char *layer, const char *reason)
     if (!strstr(messages.items[0].text, reason)) fail_msg("%s, not: %s", messages.items[0].text, reason);
 }
 
-TEST(test_compressions)
+TEST(compressions)
 {
     const exr_compression_t compressions[] = {EXR_COMPRESSION_NONE, EXR_COMPRESSION_RLE, EXR_COMPRESSION_ZIPS,
                                               EXR_COMPRESSION_ZIP, EXR_COMPRESSION_PIZ};
@@ -172,7 +172,7 @@ TEST(test_compressions)
 }
 
 // Files may have any number of channels, of which some are not wanted.
-TEST(test_choice_of_channels)
+TEST(choice_of_channels)
 {
     static const char *const files[][2] = {
         {"Y", "0"},
@@ -201,7 +201,7 @@ TEST(test_choice_of_channels)
     }
 }
 
-TEST(test_layers_by_name)
+TEST(layers_by_name)
 {
     exr_write("a.B,a.G,a.R,b.c.X,b.c.Y,b.c.Z", plain);
     check_values("a", "210", "a");
@@ -221,7 +221,7 @@ TEST(test_layers_by_name)
 }
 
 // value_at is below 1 everywhere, and only a layer's own alpha counts.
-TEST(test_alpha_is_read)
+TEST(alpha_is_read)
 {
     enum { NONE = CHANNELS };
     static const struct {
@@ -245,7 +245,7 @@ TEST(test_alpha_is_read)
     }
 }
 
-TEST(test_parts_are_layers)
+TEST(parts_are_layers)
 {
     static const char *const parts[] = {"depth:Z", "beauty:B,G,R", "other:B,G,R,a.X,a.Y,a.Z"};
     exr_close(exr_open(parts, 2, plain), 2, plain);
@@ -257,7 +257,7 @@ TEST(test_parts_are_layers)
 }
 
 // The image is black where the file has no pixels, and pixels outside of the image are not read.
-TEST(test_windows)
+TEST(windows)
 {
     static const int shifts[][2] = {{3, 5}, {-4, -2}, {-30, 1}};
     for (size_t i = 0; i < COUNT_OF(shifts); i++) {
@@ -286,7 +286,7 @@ TEST(test_windows)
 
 // A color of luminance and chroma at half the resolution, as OpenEXR stores it: of (0.8, 0.2, 0.1) Y is
 // 0.2126 R + 0.7152 G + 0.0722 B.
-TEST(test_luminance_and_chroma)
+TEST(luminance_and_chroma)
 {
     enum { SIDE = 4 };
     const float y = 0.32034F;
@@ -319,7 +319,7 @@ TEST(test_luminance_and_chroma)
     }
 }
 
-TEST(test_other_primaries_are_named)
+TEST(other_primaries_are_named)
 {
     const char *names = "B,G,R";
     for (int is_wide = 0; is_wide < 2; is_wide++) {
@@ -340,7 +340,7 @@ TEST(test_other_primaries_are_named)
 
 // Among blocks of every size and compressibility are some whose compressed size is their full size, which
 // glint must not spoil.
-TEST(test_blocks_as_large_as_compressed)
+TEST(blocks_as_large_as_compressed)
 {
     uint32_t random = 1;
     for (uint32_t width = 8; width < 48; width++) {
@@ -364,7 +364,7 @@ TEST(test_blocks_as_large_as_compressed)
 }
 
 // The file is the same however many rows come at once, be they parts of blocks, many blocks, or both.
-TEST(test_rows_in_any_number)
+TEST(rows_in_any_number)
 {
     enum { ROWS = 611, COLUMNS = 7, LAYERS = 3 };
     const ImageLayer layers[] = {{"object", 1, 'u'}, {"position.X,position.Y", 2, 'f'}};
@@ -406,7 +406,7 @@ TEST(test_rows_in_any_number)
     assert_memory_equal(image.values, values[0], sizeof values[0]);
 }
 
-TEST(test_integer_channels_are_refused)
+TEST(integer_channels_are_refused)
 {
     exr_context_t context;
     int part;

@@ -35,7 +35,7 @@ static void check_all(float value)
     }
 }
 
-TEST(test_special_values)
+TEST(special_values)
 {
     const float values[] = {0,           -0.0F,   -1,       1,          0.5F,     1.0000001F,
                             0.99999994F, NAN,     INFINITY, -INFINITY,  1e-45F,   1.17549435e-38F,
@@ -67,7 +67,7 @@ static void check_thresholds(Transfer transfer, unsigned bits)
     }
 }
 
-TEST(test_thresholds)
+TEST(thresholds)
 {
     check_thresholds(TRANSFER_SRGB, 8);
     check_thresholds(TRANSFER_NONE, 8);
@@ -75,7 +75,7 @@ TEST(test_thresholds)
     check_thresholds(TRANSFER_NONE, 16);
 }
 
-TEST(test_many_values)
+TEST(many_values)
 {
     uint32_t random = 12345;
     for (int i = 0; i < 200000; i++) {

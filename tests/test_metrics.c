@@ -25,7 +25,7 @@ static Image gray_image(unsigned step)
     return image;
 }
 
-TEST(test_equal_images)
+TEST(equal_images)
 {
     OwnedImage image = gray_image(128);
     ImageMetrics metrics = image_metrics(&image, &image);
@@ -35,7 +35,7 @@ TEST(test_equal_images)
     assert_true(metrics.flip_mean == 0 && metrics.flip_max == 0 && metrics.linear.largest == 0);
 }
 
-TEST(test_one_black_pixel)
+TEST(one_black_pixel)
 {
     OwnedImage plain = gray_image(128), spot = gray_image(128);
     for (size_t channel = 0; channel < 3; channel++)
@@ -57,7 +57,7 @@ TEST(test_one_black_pixel)
     assert_near(metrics.flip_max, 0.171734, 2e-6);
 }
 
-TEST(test_one_step_lighter)
+TEST(one_step_lighter)
 {
     OwnedImage plain = gray_image(128), lighter = gray_image(129);
     ImageMetrics metrics = image_metrics(&plain, &lighter);
@@ -68,7 +68,7 @@ TEST(test_one_step_lighter)
     assert_near(metrics.flip_max, 0.0298688, 1e-5);
 }
 
-TEST(test_black_and_white)
+TEST(black_and_white)
 {
     OwnedImage black = gray_image(0), white = gray_image(255);
     ImageMetrics metrics = image_metrics(&black, &white);
@@ -77,7 +77,7 @@ TEST(test_black_and_white)
     assert_near(metrics.flip_mean, 0.967392, 1e-5);
 }
 
-TEST(test_what_is_not_finite)
+TEST(what_is_not_finite)
 {
     OwnedImage plain = gray_image(128), broken = gray_image(128);
     plain.display = broken.display = false;
@@ -94,7 +94,7 @@ TEST(test_what_is_not_finite)
     assert_true(metrics.flip_max > 0 && metrics.flip_max <= 1); // the missing number shows as none
 }
 
-TEST(test_zeros_of_two_signs_differ)
+TEST(zeros_of_two_signs_differ)
 {
     float plus = 0, minus = -0.0F;
     Image a = {.width = 1, .height = 1, .channels = 1, .values = &plus}, b = a;
@@ -105,7 +105,7 @@ TEST(test_zeros_of_two_signs_differ)
     assert_false(metrics.has_color);
 }
 
-TEST(test_ulp_distance)
+TEST(distance_in_ulp)
 {
     const double inf = (double)INFINITY, nan = (double)NAN;
     assert_true(ulp_distance(1, 1 + 0x1p-23, false) == 1 && ulp_distance(1, 1 - 0x1p-24, false) == 0.5);
@@ -116,7 +116,7 @@ TEST(test_ulp_distance)
     assert_true(isinf(ulp_distance(inf, -inf, true)) && isinf(ulp_distance(1, nan, true)));
 }
 
-TEST(test_summary_by_hand)
+TEST(summary_by_hand)
 {
     const double expected[] = {0, 1, (double)NAN, 2, 4, 3}, found[] = {1, 1, 5, 2, 2, -(double)INFINITY};
     ErrorSummary summary = error_summarize(expected, found, 6);
@@ -130,7 +130,7 @@ TEST(test_summary_by_hand)
     assert_int_equal(error_summarize(expected, found, 0).count, 0);
 }
 
-TEST(test_percentile)
+TEST(percentile)
 {
     enum { COUNT = 5000 };
     double expected[COUNT] = {0}, found[COUNT];
@@ -140,7 +140,7 @@ TEST(test_percentile)
     assert_near(error_summarize(expected, found, COUNT).largest, 5000e-6, 1e-9);
 }
 
-TEST(test_kinds_that_do_not_compare)
+TEST(kinds_that_do_not_compare)
 {
     float value[3] = {0};
     Image image = {.width = 1, .height = 1, .channels = 3, .values = value}, other = image;
@@ -155,7 +155,7 @@ TEST(test_kinds_that_do_not_compare)
 }
 
 // Green's construction keeps .30 R + .59 G + .11 B at the fraction wherever no channel is clipped.
-TEST(test_heatmap_rises)
+TEST(heatmap_rises)
 {
     float color[3];
     double last = -1;

@@ -545,7 +545,7 @@ static void progress_note(void *context, const char *path)
 }
 
 // The material library is read last.
-TEST(test_progress)
+TEST(progress)
 {
     file_write("a.obj", "mtllib missing.mtl\nusemtl red\n" CORNERS "f 1 2 3\nf 1 2 3\n");
     const char text[] = SCENE_OF("") "  - sphere: {center: [0, 0, 0], radius: 1}\n";

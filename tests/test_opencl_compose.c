@@ -14,7 +14,7 @@ static const EmbeddedFile files[] = {
     {NULL, NULL},
 };
 
-TEST(test_each_include_once)
+TEST(each_include_once)
 {
     OWNED char *text = kernel_compose(files, "root.cl", "#define X 1");
     assert_string_equal(text, "#line 1 \"prelude\"\n#define X 1\n"
@@ -33,14 +33,14 @@ static void compose_root(void *root)
     free(kernel_compose(files, root, ""));
 }
 
-TEST(test_missing_files)
+TEST(missing_files)
 {
     char lost[] = "lost.cl", root[] = "root";
     assert_non_null(strstr(child_run(compose_root, lost, sizeof lost).errors, "kernel file gone.h is not"));
     assert_non_null(strstr(child_run(compose_root, root, sizeof root).errors, "kernel file root is not"));
 }
 
-TEST(test_every_embedded_file_composes)
+TEST(every_embedded_file_composes)
 {
     for (const EmbeddedFile *file = kernel_files; file->name; file++) {
         OWNED char *text = program_text(file->name, "");
@@ -49,7 +49,7 @@ TEST(test_every_embedded_file_composes)
     }
 }
 
-TEST(test_event_times)
+TEST(event_times)
 {
     static const struct {
         cl_ulong start, end;
@@ -75,7 +75,7 @@ TEST(test_event_times)
     }
 }
 
-TEST(test_work_groups_fit)
+TEST(work_groups_fit)
 {
     static const struct {
         size_t preferred[2], largest, sides[2], fit[2];

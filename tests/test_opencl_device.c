@@ -48,7 +48,7 @@ static void machine_fill(Machine *machine)
     machine->list = (DeviceList){.items = items, .count = 6, .platform_count = 3};
 }
 
-TEST(test_choice)
+TEST(choice)
 {
     static const struct {
         const char *selector;
@@ -108,7 +108,7 @@ TEST(test_choice)
     }
 }
 
-TEST(test_choice_falls_back)
+TEST(choice_falls_back)
 {
     Machine machine = {0};
     machine_fill(&machine);
@@ -130,7 +130,7 @@ TEST(test_choice_falls_back)
     assert_null(strstr(messages.items[2].text, "HOME"));
 }
 
-TEST(test_lanes)
+TEST(lanes)
 {
     static const unsigned cases[][2] = {{1, 1}, {2, 1}, {3, 1}, {4, 4}, {8, 8}, {12, 8}, {16, 16}, {64, 16}};
     Device device = fabricated(0, CL_DEVICE_TYPE_CPU, "", "");
@@ -150,7 +150,7 @@ TEST(test_lanes)
     assert_int_equal(device_lanes(&device, false, 16), 16);
 }
 
-TEST(test_selector)
+TEST(selector)
 {
     unsetenv("GLINT_DEVICE");
     assert_null(device_selector(NULL));
@@ -189,7 +189,7 @@ static void list_look(void *result)
     device_list_close(&list);
 }
 
-TEST(test_list_of_this_machine)
+TEST(list_of_this_machine)
 {
     ListFacts facts = {0};
     assert_int_equal(child_run(list_look, &facts, sizeof facts).status, 0);
@@ -197,7 +197,7 @@ TEST(test_list_of_this_machine)
     assert_true(facts.sound);
 }
 
-TEST(test_list_without_platforms)
+TEST(list_without_platforms)
 {
     const char *before = getenv("OCL_ICD_VENDORS");
     OWNED char *kept = before ? strdup(before) : NULL;

@@ -50,7 +50,7 @@ static void calls_fail(const char *call, bool returns_null, bool is_needed)
     some_calls_fail(call, 12, returns_null, is_needed);
 }
 
-TEST(test_needed_calls)
+TEST(needed_calls)
 {
     static const char *const needed[] = {
         "clCreateContext", "clCreateCommandQueue",   "clCreateBuffer",      "clSetKernelArg",
@@ -64,7 +64,7 @@ TEST(test_needed_calls)
 }
 
 // Unmaps are needed where a launch follows. The last two, those of the trace, come after all results.
-TEST(test_unmaps)
+TEST(unmaps)
 {
     static const char call[] = "clEnqueueUnmapMemObject";
     assert_work_is_right();
@@ -75,7 +75,7 @@ TEST(test_unmaps)
     assert_work_is_right();
 }
 
-TEST(test_needed_objects)
+TEST(needed_objects)
 {
     static const char *const creating[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer",
                                            "clEnqueueMapBuffer"};
@@ -85,7 +85,7 @@ TEST(test_needed_objects)
 }
 
 // Times, a kernel's limit of work-items, a binary for the cache, and releases.
-TEST(test_dispensable_calls)
+TEST(dispensable_calls)
 {
     static const char *const dispensable[] = {
         "clGetEventProfilingInfo", "clGetKernelWorkGroupInfo", "clGetProgramInfo",      "clReleaseEvent",
@@ -97,7 +97,7 @@ TEST(test_dispensable_calls)
 }
 
 // A build without a log says so, and names the disk where it is full.
-TEST(test_empty_build_log)
+TEST(empty_build_log)
 {
     for (int full = 0; full < 2; full++) {
         disk_is_full = full == 1;
@@ -117,7 +117,7 @@ TEST(test_empty_build_log)
 
 // A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
 // without a cache every program is. After a failed build, functions are built out of line.
-TEST(test_builds)
+TEST(builds)
 {
     calls_fail("clCreateProgramWithBinary", false, false);
     calls_fail("clCreateProgramWithBinary", true, false);
@@ -141,7 +141,7 @@ TEST(test_builds)
 }
 
 // The list says which call failed first, and so does the message where no device is left.
-TEST(test_discovery)
+TEST(discovery)
 {
     static const char *const queries[] = {"clGetPlatformIDs", "clGetPlatformInfo", "clGetDeviceIDs",
                                           "clGetDeviceInfo"};
@@ -172,7 +172,7 @@ TEST(test_discovery)
 }
 
 // A device whose memory is unknown is used until a buffer cannot be created.
-TEST(test_unknown_memory)
+TEST(unknown_memory)
 {
     const Device *known = work_device;
     Device unknown = *work_device;

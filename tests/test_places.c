@@ -68,7 +68,7 @@ static void check_lines(size_t i, const char *line_end)
 }
 
 // Line ends of Unix, Windows and old Macs.
-TEST(test_lines)
+TEST(lines)
 {
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         check_lines(i, "\n");
@@ -84,7 +84,7 @@ static void assert_described(const Scene *scene, size_t id, const char *expected
     assert_string_equal(text_c(&text), expected);
 }
 
-TEST(test_descriptions)
+TEST(descriptions)
 {
     OwnedScene scene = scene_of_text("a.yaml", "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
                                                "lights: [{point: {position: [3, 5, 4]}}]\n"

@@ -235,7 +235,7 @@ static void reader_feed(void *context)
     seeds_free(&seeds);
 }
 
-TEST(test_readers_survive_damage)
+TEST(readers_survive_damage)
 {
     static const char *const readers[] = {"png", "jpeg", "ppm",   "exr",        "npy",   "obj",     "mtl",
                                           "ply", "stl",  "gltf",  "glb",        "yaml",  "rt",      "cfg",

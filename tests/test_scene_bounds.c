@@ -16,7 +16,7 @@ static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)
     return bounds;
 }
 
-TEST(test_sphere_box_triangle)
+TEST(sphere_box_triangle)
 {
     Bounds sphere = bounds_of("  - sphere: {center: [1, 2, 3], radius: 2}\n", 0);
     assert_vector(sphere.min, -1, 0, 1);
@@ -29,7 +29,7 @@ TEST(test_sphere_box_triangle)
     assert_vector(triangle.max, 2, 5, 1);
 }
 
-TEST(test_discs)
+TEST(discs)
 {
     Bounds flat = bounds_of("  - disc: {center: [1, 2, 3], normal: [0, 5, 0], radius: 2}\n", 0);
     assert_vector(flat.min, -1, 2, 1);
@@ -39,7 +39,7 @@ TEST(test_discs)
     assert_vector(tilted.max, sqrt(2), sqrt(2), 2);
 }
 
-TEST(test_cylinder_and_cone)
+TEST(cylinder_and_cone)
 {
     Bounds cylinder =
         bounds_of("  - cylinder: {from: [0, 0, 0], to: [3, 3, 0], radius: 1, caps: false}\n", 0);
@@ -50,7 +50,7 @@ TEST(test_cylinder_and_cone)
     assert_vector(cone.max, 2, 4, 2);
 }
 
-TEST(test_unbounded)
+TEST(unbounded)
 {
     Bounds bounds = bounds_of("  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                               "  - cylinder: {point: [0, 0, 0], axis: [0, 1, 0], radius: 1}\n"

@@ -137,11 +137,11 @@ static void check_table(void **state)
     assert_true(count >= BROKEN_SCENES_MIN);
 }
 
-TEST_CASE(test_yaml, check_table, "yaml")
-TEST_CASE(test_rt, check_table, "rt")
-TEST_CASE(test_cfg, check_table, "cfg")
-TEST_CASE(test_nff, check_table, "nff")
-TEST_CASE(test_dat, check_table, "dat")
+TEST_CASE(yaml, check_table, "yaml")
+TEST_CASE(rt, check_table, "rt")
+TEST_CASE(cfg, check_table, "cfg")
+TEST_CASE(nff, check_table, "nff")
+TEST_CASE(dat, check_table, "dat")
 
 // Returns the longest literal part of a format, which identifies the message.
 static char *format_core(const char *format, size_t length)
@@ -192,7 +192,7 @@ static size_t check_sources(const char *folder)
 }
 
 // Runs after all broken scenes are read.
-TEST(test_every_message_has_a_scene)
+TEST(every_message_has_a_scene)
 {
     // tests/test_scene_yaml.c and test_scene_include.c have them, without a file or with many
     text_appendf(&all_expected, "a scene of more than 2 GiB, recursive include of '', included files");
@@ -201,7 +201,7 @@ TEST(test_every_message_has_a_scene)
     text_free(&all_expected);
 }
 
-TEST(test_names)
+TEST(names)
 {
     OwnedMessageList messages = {0};
     SceneOptions options = {0};

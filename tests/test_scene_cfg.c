@@ -15,7 +15,7 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.cfg");
 }
 
-TEST(test_scene)
+TEST(scene)
 {
     assert_vector(complete.camera.position, 0, 0, 5);
     assert_vector(complete.camera.look_at, 0, 0, -1);
@@ -28,7 +28,7 @@ TEST(test_scene)
     assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
 }
 
-TEST(test_light)
+TEST(light)
 {
     assert_int_equal(complete.lights.count, 1);
     assert_int_equal(complete.lights.items[0].type, LIGHT_POINT);
@@ -36,7 +36,7 @@ TEST(test_light)
     assert_vector(complete.lights.items[0].color, 0.5, 0.6, 0.7);
 }
 
-TEST(test_sphere)
+TEST(sphere)
 {
     const Object *sphere = &complete.objects.items[0];
     assert_int_equal(sphere->type, SHAPE_SPHERE);
@@ -49,7 +49,7 @@ TEST(test_sphere)
     assert_number(material_of(sphere)->shininess, 30);
 }
 
-TEST(test_plane)
+TEST(plane)
 {
     const Object *plane = &complete.objects.items[1];
     assert_int_equal(plane->type, SHAPE_PLANE);
@@ -58,7 +58,7 @@ TEST(test_plane)
     assert_vector(material_of(plane)->color, 0, 0, 1);
 }
 
-TEST(test_cylinder)
+TEST(cylinder)
 {
     const Object *cylinder = &complete.objects.items[2];
     assert_int_equal(cylinder->type, SHAPE_CYLINDER);
@@ -69,7 +69,7 @@ TEST(test_cylinder)
     assert_number(material_of(cylinder)->specular.largest, 0.25);
 }
 
-TEST(test_cone)
+TEST(cone)
 {
     const Object *cone = &complete.objects.items[3];
     assert_int_equal(cone->type, SHAPE_CONE);
@@ -79,19 +79,19 @@ TEST(test_cone)
     assert_number(cone->as.cone.slope, tan(0.5)); // the angle is in radians
 }
 
-TEST(test_any_order_and_blanks)
+TEST(any_order_and_blanks)
 {
     assert_messages(
         "s.cfg", SPHERE "\r\n\n" LIGHT "=> camera:\r\n\n{\r\n\n  look_at 0 0 1\r\n\tposition 0\t0 0\r\n}\r\n",
         "");
 }
 
-TEST(test_text_between_blocks_is_skipped)
+TEST(text_between_blocks_is_skipped)
 {
     assert_messages("s.cfg", CAMERA "transfo 1 2 3\n" LIGHT SPHERE, "6:1: warning: skipped 'transfo'\n");
 }
 
-TEST(test_no_lights_no_objects)
+TEST(no_lights_no_objects)
 {
     assert_messages("s.cfg", CAMERA, "warning: s.cfg: no objects\nwarning: s.cfg: no lights\n");
 }

@@ -29,7 +29,7 @@ static int tear_down(void **state)
 }
 
 // z is negated.
-TEST(test_camera)
+TEST(camera)
 {
     const Camera *camera = &complete.camera;
     assert_int_equal(complete.width, 640);
@@ -48,7 +48,7 @@ TEST(test_camera)
     assert_number(scene.camera.frame_aspect, 0);
 }
 
-TEST(test_lights)
+TEST(lights)
 {
     const Light *lights = complete.lights.items;
     assert_vector(complete.ambient, 1, 1, 1);
@@ -66,7 +66,7 @@ TEST(test_lights)
     assert_vector(lights[4].color, 0.25, 0, 0);
 }
 
-TEST(test_materials)
+TEST(materials)
 {
     const Material *plastic = material_of(&complete.objects.items[0]),
                    *green = material_of(&complete.objects.items[2]),
@@ -97,7 +97,7 @@ TEST(test_materials)
     assert_number(dimmed->transmission.largest, 0.75);
 }
 
-TEST(test_shapes)
+TEST(shapes)
 {
     const Object *objects = complete.objects.items;
     assert_int_equal(complete.objects.count, 16);
@@ -136,7 +136,7 @@ TEST(test_shapes)
     assert_vector(objects[13].as.cylinder.axis, -1, 0, 1);
 }
 
-TEST(test_meshes)
+TEST(meshes)
 {
     const Object *ring = &complete.objects.items[14], *array = &complete.objects.items[15];
     assert_int_equal(ring->type, SHAPE_MESH);
@@ -179,7 +179,7 @@ TEST(test_meshes)
 
 #define WARNS(text, expected) assert_messages("s.dat", LIT SPHERE text, expected)
 
-TEST(test_losses)
+TEST(losses)
 {
     WARNS("", "");
     WARNS("fog exp2 start 0 end 9 density 0.2 color 0 0 0\nfog off start 0 end 9 density 0 color 0 0 "
@@ -234,7 +234,7 @@ TEST(test_losses)
                     "warning: s.dat: no lights\n");
 }
 
-TEST(test_fading)
+TEST(fading)
 {
     const char *text = BEGIN CAMERA_OF("", "") SPHERE
         "sphere center 0 4 0 rad 1 " TEXTURE
@@ -246,7 +246,7 @@ TEST(test_fading)
     assert_true(fading[0] == 1 && fading[1] == 2 && fading[2] == 1);
 }
 
-TEST(test_frustum)
+TEST(frustum)
 {
     OwnedScene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("", "frustum -1 2 -3 1 ") SPHERE);
     assert_number(scene.camera.half_tangent, 2);
@@ -255,7 +255,7 @@ TEST(test_frustum)
     assert_number(scene.camera.shift[1], -0.25);
 }
 
-TEST(test_orthographic)
+TEST(orthographic)
 {
     OwnedScene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("projection orthographic", "") SPHERE);
     assert_true(scene.camera.projection == PROJECTION_ORTHOGRAPHIC);
@@ -264,7 +264,7 @@ TEST(test_orthographic)
 
 // Colors of Tachyon 0.99, whose rays go through a pixel's upper right corner, where four pixels of the double
 // resolution meet.
-TEST(test_picture)
+TEST(picture)
 {
     static const char text[] = "begin_scene resolution 40 30\n" CAMERA_OF(
         "", "") "directional_light direction 0.5 -1 1 color 0.9 0.8 0.7\nbackground 0.1 0.2 0.3\n"

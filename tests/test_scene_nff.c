@@ -21,7 +21,7 @@ static int tear_down(void **state)
     return complete_close(state) + probe_close(state);
 }
 
-TEST(test_view)
+TEST(view)
 {
     assert_int_equal(complete.width, 640);
     assert_int_equal(complete.height, 480);
@@ -36,7 +36,7 @@ TEST(test_view)
 }
 
 // Four lights: each without a color has the intensity sqrt(4) / 8.
-TEST(test_lights)
+TEST(lights)
 {
     assert_int_equal(complete.lights.count, 4);
     const Light *lights = complete.lights.items;
@@ -49,7 +49,7 @@ TEST(test_lights)
     assert_vector(complete.ambient, 0.25, 0.25, 0.25);
 }
 
-TEST(test_materials)
+TEST(materials)
 {
     assert_int_equal(complete.materials.count, 2);
     const Material *matte = &complete.materials.items[0], *glass = matte + 1;
@@ -67,7 +67,7 @@ TEST(test_materials)
     assert_int_equal(complete.objects.items[2].material, 1);
 }
 
-TEST(test_round_shapes)
+TEST(round_shapes)
 {
     const Object *objects = complete.objects.items;
     assert_int_equal(objects[0].type, SHAPE_SPHERE);
@@ -107,7 +107,7 @@ static double triangle_area(const Object *triangle)
     return vector_cross(vector_subtract(v[1], v[0]), vector_subtract(v[2], v[0])).z / 2;
 }
 
-TEST(test_polygons)
+TEST(polygons)
 {
     assert_int_equal(complete.objects.count, 6 + 1 + 3 + 1);
     const Object *triangles = complete.objects.items + 6;
@@ -127,7 +127,7 @@ TEST(test_polygons)
     }
 }
 
-TEST(test_tolerated)
+TEST(tolerated)
 {
     assert_messages("s.nff", LIT MATERIAL SPHERE, "");
     assert_messages("s.nff", "\xEF\xBB\xBF" LIT MATERIAL SPHERE, "");
@@ -162,7 +162,7 @@ static void check_sides(const char *shape, double reach, bool only_inside)
 
 // Rays along the z axis, from outside and from inside. What is seen only from inside is hit at its far side
 // by both.
-TEST(test_only_inside)
+TEST(only_inside)
 {
     check_sides("s 0 0 0 1", 1, false);
     check_sides("s 0 0 0 -1", 1, true);

@@ -128,7 +128,7 @@ static void check_points(const double (*points)[2], size_t count)
         check_points(points, COUNT_OF(points));                                                              \
     } while (0)
 
-TEST(test_small)
+TEST(small)
 {
     CHECK_POINTS({0, 0}, {1, 0}, {0, 1});
     CHECK_POINTS({0, 0}, {1, 0}, {1, 1}, {0, 1});
@@ -137,7 +137,7 @@ TEST(test_small)
     CHECK_POINTS({0, 0}, {1, 0.1}, {2, 0}, {1.9, 1}, {2, 2}, {1, 1.9}, {0, 2}, {0.1, 1});
 }
 
-TEST(test_corners_on_edges)
+TEST(corners_on_edges)
 {
     CHECK_POINTS({0, 0}, {1, 0}, {2, 0}, {0, 2});
     CHECK_POINTS({0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {3, 2}, {3, 3}, {1, 3}, {0, 3}, {0, 1});
@@ -145,7 +145,7 @@ TEST(test_corners_on_edges)
     CHECK_POINTS({0, 0}, {4, 0}, {4, 4}, {3, 4}, {3, 1}, {1, 1}, {1, 4}, {0, 4}, {0, 3}, {0, 2});
 }
 
-TEST(test_gear)
+TEST(gear)
 {
     static const double turns[4] = {-0.19, 0.19, 0.3, 0.7};
     Outline gear = {0};
@@ -158,7 +158,7 @@ TEST(test_gear)
     free(gear.items);
 }
 
-TEST(test_comb_and_spiral)
+TEST(comb_and_spiral)
 {
     Outline comb = {0}, spiral = {0};
     for (size_t i = 0; i < 50; i++)
@@ -183,7 +183,7 @@ TEST(test_comb_and_spiral)
     free(spiral.items);
 }
 
-TEST(test_stars)
+TEST(stars)
 {
     for (size_t trial = 0; trial < 200; trial++) {
         Outline star = {0};
@@ -200,12 +200,12 @@ TEST(test_stars)
 }
 
 // A hole, joined to the outline by an edge that runs to it and back.
-TEST(test_hole)
+TEST(hole)
 {
     CHECK_POINTS({0, 0}, {3, 0}, {3, 3}, {0, 3}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1});
 }
 
-TEST(test_repeated_corners)
+TEST(repeated_corners)
 {
     const Vector3 square[] = {{0, 0, 0}, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 1, 0}, {1, 1, 0}, {0, 1, 0}};
     assert_int_equal(polygon_triangulate(square, 7, &triangles), POLYGON_CUT);
@@ -215,7 +215,7 @@ TEST(test_repeated_corners)
     assert_int_equal(triangles.count, 2);
 }
 
-TEST(test_not_simple)
+TEST(not_simple)
 {
     const Vector3 line[] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {3, 3, 3}};
     assert_int_equal(polygon_triangulate(line, 3, &triangles), POLYGON_WITHOUT_AREA);
@@ -229,7 +229,7 @@ TEST(test_not_simple)
 
 // Shewchuk's example (1997, figure 3): points around (0.5, 0.5), a unit in the last place apart, against a
 // line through (12, 12) and (24, 24). Their exact sign is that of y - x.
-TEST(test_orientation_is_exact)
+TEST(orientation_is_exact)
 {
     const double b[2] = {12, 12}, c[2] = {24, 24};
     for (int x = -64; x < 64; x++) {
@@ -244,7 +244,7 @@ TEST(test_orientation_is_exact)
 }
 
 // Corners whose differences round to one line, or whose products vanish, and corners that are on one.
-TEST(test_area_is_exact)
+TEST(area_is_exact)
 {
     const Vector3 needles[][3] = {{{0x1p60, 0x1p60, -1}, {0, 0, -1}, {0.25, 0, -1}},
                                   {{0x1p-60, 0, 0}, {1, 1, 0}, {2, 2, 0}},

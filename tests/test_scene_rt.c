@@ -16,7 +16,7 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.rt");
 }
 
-TEST(test_scene)
+TEST(scene)
 {
     assert_int_equal(complete.width, 640);
     assert_int_equal(complete.height, 480);
@@ -32,7 +32,7 @@ TEST(test_scene)
     assert_number(complete.camera.frame_aspect, 0);
 }
 
-TEST(test_lights)
+TEST(lights)
 {
     assert_int_equal(complete.lights.count, 3);
     const Light *lights = complete.lights.items;
@@ -43,7 +43,7 @@ TEST(test_lights)
     assert_vector(lights[2].color, 0, 0, 0.25);
 }
 
-TEST(test_sphere_and_plane)
+TEST(sphere_and_plane)
 {
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1;
     assert_int_equal(sphere->type, SHAPE_SPHERE);
@@ -61,7 +61,7 @@ TEST(test_sphere_and_plane)
     assert_number(material_of(plane)->specular.largest, 0);
 }
 
-TEST(test_cylinder_and_cone)
+TEST(cylinder_and_cone)
 {
     const Object *cylinder = &complete.objects.items[2], *cone = &complete.objects.items[6];
     assert_int_equal(cylinder->type, SHAPE_CYLINDER);
@@ -78,7 +78,7 @@ TEST(test_cylinder_and_cone)
     assert_true(cone->as.cone.finite && cone->as.cone.caps);
 }
 
-TEST(test_square_and_triangle)
+TEST(square_and_triangle)
 {
     const Object *first = &complete.objects.items[3], *second = first + 1, *triangle = first + 2;
     assert_int_equal(first->type, SHAPE_TRIANGLE);
@@ -96,7 +96,7 @@ TEST(test_square_and_triangle)
     assert_int_equal(complete.objects.count, 7);
 }
 
-TEST(test_square_on_the_floor)
+TEST(square_on_the_floor)
 {
     OwnedScene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
     size_t unbounded_count;
@@ -105,14 +105,14 @@ TEST(test_square_on_the_floor)
     assert_vector(bounds.max, 1, 0, 1);
 }
 
-TEST(test_blanks_comments_and_line_ends)
+TEST(blanks_comments_and_line_ends)
 {
     assert_messages(
         "s.rt", "\xEF\xBB\xBF# top\r\n\r\n \tC\t0,0,0   0,0,1\t60 # end\r\nL 0,0,9 1#x\r\nsp 0,0,0 1 1,2,3",
         "");
 }
 
-TEST(test_missing_parts_are_fine)
+TEST(missing_parts_are_fine)
 {
     assert_messages("s.rt", CAMERA, "warning: s.rt: no objects\nwarning: s.rt: no lights\n");
     OwnedScene scene = scene_of_text("s.rt", CAMERA);
@@ -120,7 +120,7 @@ TEST(test_missing_parts_are_fine)
     assert_int_equal(scene.width, 0);
 }
 
-TEST(test_axes_are_made_unit)
+TEST(axes_are_made_unit)
 {
     assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
                     "3:10: warning: 'normal' is not a unit vector; normalized\n");
@@ -130,7 +130,7 @@ TEST(test_axes_are_made_unit)
     assert_vector(scene.objects.items[0].as.cylinder.axis, 0, 4, 0);
 }
 
-TEST(test_zero_camera_direction)
+TEST(zero_camera_direction)
 {
     assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
                     "1:12: warning: 'direction' is zero; the camera looks along +z\n");
@@ -138,13 +138,13 @@ TEST(test_zero_camera_direction)
     assert_vector(scene.camera.look_at, 0, 0, 1);
 }
 
-TEST(test_far_camera_keeps_its_direction)
+TEST(far_camera_keeps_its_direction)
 {
     OwnedScene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
     assert_true(scene.camera.look_at.z > 0);
 }
 
-TEST(test_color_before_sizes)
+TEST(color_before_sizes)
 {
     assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
                     "3:16: warning: the color stands before the sizes\n");
@@ -154,7 +154,7 @@ TEST(test_color_before_sizes)
     assert_number(scene.materials.items[0].specular.largest, 0.5);
 }
 
-TEST(test_first_of_several_old_cameras)
+TEST(first_of_several_old_cameras)
 {
     assert_messages("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\nL 0,9,0 1\n" SPHERE,
                     "2:1: warning: only the first camera is used\n");
@@ -162,7 +162,7 @@ TEST(test_first_of_several_old_cameras)
     assert_vector(scene.camera.position, 0, 0, 0);
 }
 
-TEST(test_lenient_skips_what_it_does_not_know)
+TEST(lenient_skips_what_it_does_not_know)
 {
     OwnedText messages =
         scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
@@ -171,7 +171,7 @@ TEST(test_lenient_skips_what_it_does_not_know)
 }
 
 // Blanks next to commas, a brightness above 1, checkers and the names of textures.
-TEST(test_lenient_reads_dialects)
+TEST(lenient_reads_dialects)
 {
     const char *const text = "A 0.2 255, 255,255\nC 0 ,0, -5 0,0 , 1 60\nL 1,2,\t3 1.5 255,0,0\n"
                              "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
@@ -193,7 +193,7 @@ TEST(test_lenient_reads_dialects)
     assert_number(scene.materials.items[0].specular.largest, 0.5);
 }
 
-TEST(test_lenient_keeps_other_errors)
+TEST(lenient_keeps_other_errors)
 {
     OwnedText messages = scene_messages("s.rt",
                                         LIT "sp 0,0,0 -2 255,0,0\nsp 0, ,0 2 255,0,0\nsp 0, 0 2 255,0,0\n"
@@ -206,7 +206,7 @@ TEST(test_lenient_keeps_other_errors)
                         "6:9: error: 'ratio' must be 0 or more\n");
 }
 
-TEST(test_many_warnings_are_counted)
+TEST(many_warnings_are_counted)
 {
     OwnedText text = {0};
     text_appendf(&text, LIT);

@@ -19,7 +19,7 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.yaml");
 }
 
-TEST(test_scene_keys)
+TEST(scene_keys)
 {
     assert_vector(complete.camera.position, 0, 1.5, -6);
     assert_vector(complete.camera.look_at, 0, 1, 0);
@@ -34,7 +34,7 @@ TEST(test_scene_keys)
     assert_int_equal(complete.height, 0);
 }
 
-TEST(test_lights)
+TEST(lights)
 {
     assert_int_equal(complete.lights.count, 4);
     const Light *point = &complete.lights.items[0], *directional = point + 1, *spot = point + 2,
@@ -55,7 +55,7 @@ TEST(test_lights)
     assert_number(other->spot.penumbra, 0);
 }
 
-TEST(test_materials)
+TEST(materials)
 {
     assert_int_equal(complete.materials.count, 5);
     assert_int_equal(complete.material_names.count, 5);
@@ -90,7 +90,7 @@ TEST(test_materials)
     assert_number(defaults.checker.size, 1);
 }
 
-TEST(test_tints)
+TEST(tints)
 {
     OwnedScene scene =
         scene_of_text("a.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
@@ -134,7 +134,7 @@ TEST(test_tints)
     assert_number(gray[5].ambient, 2);
 }
 
-TEST(test_energy)
+TEST(energy)
 {
     assert_messages("a.yaml",
                     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
@@ -149,7 +149,7 @@ TEST(test_energy)
                     "warning: a.yaml: no objects\nwarning: a.yaml: no lights\n");
 }
 
-TEST(test_round_shapes)
+TEST(round_shapes)
 {
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1, *disc = sphere + 2;
     assert_int_equal(sphere->type, SHAPE_SPHERE);
@@ -167,7 +167,7 @@ TEST(test_round_shapes)
     assert_number(disc->as.disc.radius, 0.5);
 }
 
-TEST(test_cylinders)
+TEST(cylinders)
 {
     const Object *open = &complete.objects.items[4], *capped = open + 1, *infinite = open + 2;
     assert_int_equal(open->type, SHAPE_CYLINDER);
@@ -185,7 +185,7 @@ TEST(test_cylinders)
     assert_number(complete.materials.items[4].shininess, 64);
 }
 
-TEST(test_cones)
+TEST(cones)
 {
     const Object *frustum = &complete.objects.items[7], *tip = frustum + 1, *infinite = frustum + 2;
     assert_int_equal(frustum->type, SHAPE_CONE);
@@ -204,7 +204,7 @@ TEST(test_cones)
     assert_number(infinite->as.cone.slope, 1);
 }
 
-TEST(test_flat_shapes)
+TEST(flat_shapes)
 {
     const Object *box = &complete.objects.items[3], *flat = &complete.objects.items[10], *smooth = flat + 1;
     assert_int_equal(box->type, SHAPE_BOX);
@@ -221,7 +221,7 @@ TEST(test_flat_shapes)
     assert_int_equal(smooth->material, 0);
 }
 
-TEST(test_defaults)
+TEST(defaults)
 {
     OwnedScene scene = scene_of_text("s.yaml", CAMERA);
     assert_vector(scene.camera.up, 0, 1, 0);
@@ -233,7 +233,7 @@ TEST(test_defaults)
     assert_int_equal(scene.objects.count, 0);
 }
 
-TEST(test_focal_length)
+TEST(focal_length)
 {
     OwnedScene scene = scene_of_text(
         "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2], "
@@ -244,7 +244,7 @@ TEST(test_focal_length)
     assert_true(scene.camera.shift[0] == -0.5 && scene.camera.shift[1] == 0.25);
 }
 
-TEST(test_block_style_and_number_forms)
+TEST(block_style_and_number_forms)
 {
     OwnedScene scene =
         scene_of_text("s.yaml", "\xEF\xBB\xBF---\r\n" // byte order mark, document start, CRLF
@@ -254,7 +254,7 @@ TEST(test_block_style_and_number_forms)
     assert_vector(scene.camera.look_at, 0, 0, 100);
 }
 
-TEST(test_names_in_every_style)
+TEST(names_in_every_style)
 {
     char name[400 + 1] = {0}; // longer than one read of a scalar
     memset(name, 'n', sizeof name - 1);
@@ -271,14 +271,14 @@ TEST(test_names_in_every_style)
     assert_string_equal(scene.material_names.items[4], "it's folded");
 }
 
-TEST(test_tiny_numbers_are_zero)
+TEST(tiny_numbers_are_zero)
 {
     OwnedScene scene = scene_of_text("s.yaml", CAMERA "background: [1e-31, 1e-999, 1e-30]\n");
     assert_true(scene.background.x == 0 && scene.background.y == 0 && scene.background.z == 1e-30);
 }
 
 // The linear values of sRGB are those of Python's decimal module, rounded to float.
-TEST(test_colors)
+TEST(colors)
 {
     const double half = 0.21586050011389926F, dark = 0.0030352698354883752F, third = 0.033104766570885055F;
     OwnedScene scene =
@@ -322,7 +322,7 @@ static Scene scene_of_set(const char *text, const char *const *overrides, size_t
     scene_of_set(text, (const char *const[]){__VA_ARGS__},                                                   \
                  sizeof(const char *[]){__VA_ARGS__} / sizeof(char *))
 
-TEST(test_values_are_set)
+TEST(values_are_set)
 {
     OwnedScene scene =
         SET(LIT SPHERE, "camera.fov=60", "ambient=#f00", "background= 0.5", "camera.fov=40",
@@ -343,7 +343,7 @@ TEST(test_values_are_set)
     assert_vector(scene.materials.items[scene.objects.items[1].material].color, 0, 0.5, 0);
 }
 
-TEST(test_values_are_removed)
+TEST(values_are_removed)
 {
     OwnedScene scene =
         SET("camera: {position: [0, 0, -5], look_at: [0, 0, 0], focal_length: 1, frame: [2, 1]}\n"
@@ -360,7 +360,7 @@ TEST(test_values_are_removed)
 }
 
 // A value that is set through one of several names of the same nodes changes only under that name.
-TEST(test_aliases_keep_what_is_set_elsewhere)
+TEST(aliases_keep_what_is_set_elsewhere)
 {
     OwnedScene scene =
         SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
@@ -387,7 +387,7 @@ TEST(test_aliases_keep_what_is_set_elsewhere)
 }
 
 // A message about an image that was set points into the override's text.
-TEST(test_textures_that_are_set_have_a_place)
+TEST(textures_that_are_set_have_a_place)
 {
     static const char *const overrides[] = {"ambient=1", "objects[0].sphere.material={image: lost.png}"};
     OwnedText source = {0}, described = {0};
@@ -416,7 +416,7 @@ static void write_layered_image(const char *path)
     assert_true(image_writer_commit(writer, &messages));
 }
 
-TEST_WITH(test_layers_of_images, folder_open, folder_close)
+TEST_WITH(layers_of_images, folder_open, folder_close)
 {
     assert_int_equal(mkdir("scenes", 0700), 0);
     write_layered_image("scenes/a.exr");
@@ -437,7 +437,7 @@ TEST_WITH(test_layers_of_images, folder_open, folder_close)
         assert_int_equal(scene.materials.items[i].image.texture, textures[i]);
 }
 
-TEST(test_materials_may_follow_objects)
+TEST(materials_may_follow_objects)
 {
     OwnedScene scene =
         scene_of_text("s.yaml", LIT "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: b}\n"
@@ -445,7 +445,7 @@ TEST(test_materials_may_follow_objects)
     assert_number(scene.materials.items[scene.objects.items[0].material].shininess, 7);
 }
 
-TEST(test_warnings)
+TEST(warnings)
 {
     assert_messages("s.yaml", LIT SPHERE, "");
     assert_messages("s.yaml", CAMERA SPHERE, "warning: s.yaml: no lights\n");
@@ -454,7 +454,7 @@ TEST(test_warnings)
                     "5:15: warning: a triangle without area is never hit\n");
 }
 
-TEST(test_a_failed_scene_is_empty)
+TEST(a_failed_scene_is_empty)
 {
     OwnedText text = {0};
     text_appendf(&text, LIT SPHERE "purple: 1\n");
@@ -469,7 +469,7 @@ TEST(test_a_failed_scene_is_empty)
 }
 
 // A node's offsets cannot count this many bytes. Those beyond the scene here are never read.
-TEST(test_more_than_2_gibibytes_are_refused)
+TEST(more_than_2_gibibytes_are_refused)
 {
     const Source source = {.file = "s.yaml", .bytes = CAMERA SPHERE, .length = ((size_t)1 << 31) + 1};
     MessageList messages = {0};

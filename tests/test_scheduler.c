@@ -97,7 +97,7 @@ static void set_paces(Scheduler *scheduler, size_t worker_count, const unsigned 
         assert_true(give_at(scheduler, i, take(scheduler, i), rows_per_second[i]));
 }
 
-TEST(test_one_worker_gets_what_it_asks_for)
+TEST(one_worker_gets_what_it_asks_for)
 {
     Sink sink;
     WorkerShare share;
@@ -110,7 +110,7 @@ TEST(test_one_worker_gets_what_it_asks_for)
     assert_int_equal(share.bands, ROWS / ROWS_MAX);
 }
 
-TEST(test_lower_bands_wait)
+TEST(lower_bands_wait)
 {
     Sink sink;
     WorkerShare shares[3];
@@ -132,7 +132,7 @@ TEST(test_lower_bands_wait)
 }
 
 // A worker may be a thousand times slower than the others.
-TEST(test_first_bands_are_short)
+TEST(first_bands_are_short)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 3);
@@ -143,7 +143,7 @@ TEST(test_first_bands_are_short)
 }
 
 // A band is half of a worker's share of the rows that are left, in whole steps and at least one.
-TEST(test_bands_shrink)
+TEST(bands_shrink)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -158,7 +158,7 @@ TEST(test_bands_shrink)
     assert_true(sink.is_right);
 }
 
-TEST(test_bands_follow_the_pace)
+TEST(bands_follow_the_pace)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -170,7 +170,7 @@ TEST(test_bands_follow_the_pace)
 }
 
 // A worker gets no rows where the other ends sooner with all that are left, unless that fails.
-TEST(test_the_slow_leave_the_rest)
+TEST(the_slow_leave_the_rest)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -186,7 +186,7 @@ TEST(test_the_slow_leave_the_rest)
     assert_true(sink.is_right);
 }
 
-TEST(test_a_dropped_workers_rows_go_to_others)
+TEST(a_dropped_workers_rows_go_to_others)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -205,7 +205,7 @@ TEST(test_a_dropped_workers_rows_go_to_others)
     assert_true(sink.is_right);
 }
 
-TEST(test_nobody_is_left)
+TEST(nobody_is_left)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -217,7 +217,7 @@ TEST(test_nobody_is_left)
     assert_false(scheduler_close(scheduler, NULL));
 }
 
-TEST(test_the_sink_ends_the_render)
+TEST(the_sink_ends_the_render)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -245,7 +245,7 @@ static void work_a_step(Scheduler *scheduler, uint32_t first_row)
 }
 
 // A worker that is too far ahead waits for the one that has the top, or for what that leaves.
-TEST(test_few_bands_wait)
+TEST(few_bands_wait)
 {
     for (int is_dropped = 0; is_dropped < 2; is_dropped++) {
         enum { ROW_BYTES = WIDTH * COMPONENTS * sizeof(float) };
@@ -293,7 +293,7 @@ static void *thread_work(void *argument)
 }
 
 // A worker without rows waits, since it receives those of a worker that fails later.
-TEST(test_idle_workers_wait_for_lost_rows)
+TEST(idle_workers_wait_for_lost_rows)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
@@ -313,7 +313,7 @@ TEST(test_idle_workers_wait_for_lost_rows)
     assert_true(sink.is_right);
 }
 
-TEST(test_many_threads)
+TEST(many_threads)
 {
     enum { COUNT = 4, ROUNDS = 200 };
     for (int round = 0; round < ROUNDS; round++) {

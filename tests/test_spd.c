@@ -66,7 +66,7 @@ static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
     renderer_close(renderer);
 }
 
-TEST(test_counts)
+TEST(counts)
 {
     if (access(SPD, F_OK) != 0) {
         print_message("no " SPD ": skipped\n");
