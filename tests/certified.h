@@ -1,13 +1,10 @@
 // Renders at `certified` and compares with the exact reference, for the tests of one program.
 #pragma once
 
-#include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "host/verify/certify.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
-#include <math.h>
 
 static Random random_state;
 

@@ -1,8 +1,6 @@
 #include "tests/check.h"
 
 #include "host/base/fault.h"
-#include <stdio.h>
-#include <stdlib.h>
 
 enum { TESTS_MAX = 64 };
 

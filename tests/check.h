@@ -1,14 +1,21 @@
-// Provides the includes and macros that each test program of cmocka begins with.
+// Provides what each test program of cmocka begins with: the includes that most of them need, and macros.
 #pragma once
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/message.h"
+#include "host/base/text.h"
 
+#include <float.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 

@@ -2,15 +2,9 @@
 #include "tests/check.h"
 
 #include "host/base/fault.h"
-#include "host/base/memory.h"
-#include "host/base/text.h"
 #include <dirent.h>
 #include <ftw.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static char *folder_make(void)
 {

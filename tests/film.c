@@ -1,11 +1,7 @@
 #include "tests/film.h"
 #include "tests/check.h"
 
-#include "host/base/memory.h"
 #include "host/render/arithmetic.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 bool tests_are_long(void)
 {

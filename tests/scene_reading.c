@@ -2,9 +2,6 @@
 #include "host/import/load.h"
 #include "tests/check.h"
 
-#include <math.h>
-#include <string.h>
-
 bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages)
 {
     Source source = {.file = name, .bytes = text_c(text), .length = text->count};

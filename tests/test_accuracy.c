@@ -1,15 +1,9 @@
 // Checks the errors of images made by hand, in which the count of each type is known, and the conclusions
 // from errors and times. tests/test_accuracy.py checks the same figures of rendered images against an
 // independent implementation.
-#include "host/base/memory.h"
 #include "host/measure/accuracy.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-
-#include <float.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { WIDTH = 12, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, LIGHTS = 2, NOTHING_FROM = 10 };
 

@@ -1,13 +1,10 @@
 // Tests messages with their place, growing text, similar words, stages, hashes, and output files next to
 // their target.
-#include "host/base/array.h"
 #include "host/base/base64.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
-#include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/base/stage.h"
-#include "host/base/text.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
@@ -16,13 +13,9 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 static char *printed(const MessageList *messages)
 {

@@ -4,11 +4,7 @@
 #include "tests/check.h"
 #include "tests/child.h"
 
-#include <float.h>
 #include <jansson.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static char *json_printed(Json *json)
 {

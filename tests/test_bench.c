@@ -7,12 +7,7 @@
 #include "tests/child.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
-#include <unistd.h>
 
 TEST(quantiles)
 {

@@ -2,10 +2,8 @@
 // run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 enum { PIXELS_MAX = 64 * 48, BLURRED_COUNT = 12, OPEN_AT_MOST = 10 };
 

@@ -2,15 +2,11 @@
 // million with GLINT_LONG_TESTS=1.
 //
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
-#include <math.h>
 
 static Random random_state;
 

@@ -1,15 +1,11 @@
 // Checks the BVH's invariants for any boxes.
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/compile/bvh_widen.h"
-#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 static Random random_state;
 

@@ -7,8 +7,6 @@
 #include "host/view/preview.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <stdlib.h>
-#include <string.h>
 
 static const ImageSize size = {640, 360};
 

@@ -2,12 +2,9 @@
 // whatever the ray hits and wherever it starts.
 #include "host/verify/reference_scene.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/random_scene.h"
-#include <float.h>
-#include <math.h>
 
 typedef struct {
     size_t certain, in_double, uncertain, hits;

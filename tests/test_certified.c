@@ -5,14 +5,10 @@
 // same holds for the images of the hard cases. The program takes a pattern of its tests' names.
 // run_tests: sanitize-long-only
 // run_tests: first
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/object_transform.h"
 #include "host/verify/verify.h"
 #include "tests/certified.h"
-#include <math.h>
-#include <string.h>
 
 enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 120 };
 

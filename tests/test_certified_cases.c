@@ -4,12 +4,8 @@
 // names.
 //
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "tests/certified.h"
-#include <math.h>
-#include <string.h>
 
 // Lights lie above a wall by less than its distance is rounded by, bright ones almost graze it, and others
 // are so far from it that the squared distance overflows.

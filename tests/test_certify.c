@@ -3,7 +3,6 @@
 // run_tests: sanitize-long-only
 #include "host/verify/certify.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 

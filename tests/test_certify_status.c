@@ -1,14 +1,11 @@
 // Tests the exit status of glint certify for a wrong image. One pixel of the rendered image is changed, or
 // the rendered scene differs from the certified one in what only a mirror shows.
 #include "host/base/fault.h"
-#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/render/renderer.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/film.h"
-#include <stdlib.h>
-#include <string.h>
 
 enum { COLUMN = 7, ROW = 5 };
 

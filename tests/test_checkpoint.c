@@ -1,15 +1,10 @@
 // Tests checkpoints: appended bands are read back whatever a crash left at the end of the file, and a file of
 // another image is refused and stays unchanged.
-#include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/render/scheduler.h"
 #include "tests/check.h"
 #include "tests/files.h"
 #include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 enum { WIDTH = 5, ROWS = 12, BAND_ROWS = 4, BANDS = ROWS / BAND_ROWS, COLOR_VALUES = BAND_ROWS * WIDTH * 3 };
 static const char key[] = "size: 5x12\nscene: 1234\n";

@@ -1,17 +1,12 @@
 // Tests what a command prints, writes and exits with if an OpenCL call fails or its driver crashes.
 #include "host/base/fault.h"
-#include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/failing/calls.h"
 #include "tests/files.h"
 #include <signal.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 typedef struct {
     int (*run)(int argument_count, char **arguments);

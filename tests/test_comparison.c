@@ -5,10 +5,6 @@
 #include "host/measure/comparison.h"
 #include "tests/check.h"
 
-#include <math.h>
-#include <stdint.h>
-#include <stdio.h>
-
 static Random generator;
 
 static double random_unit(void)

@@ -1,11 +1,8 @@
 // Tests the box around the points where transparent and opaque objects may touch. A hit outside it is never
 // tested for an opaque surface at the same point, so the box must contain all such points and should contain
 // little else.
-#include "host/compile/compile.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <float.h>
-#include <math.h>
 
 #define STAGE                                                                                                \
     "camera: {position: [0, 0, 0], look_at: [0, 0, -1]}\n"                                                   \

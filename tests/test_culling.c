@@ -2,13 +2,10 @@
 // be culled, and every sphere clearly outside it must be. The cull of several packets is tried with one ray,
 // where it bounds a single direction. test_invariances compares whole scenes with and without cull spheres.
 // run_tests: sanitize-long-only
-#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
 #include "tests/check.h"
 #include "tests/probe.h"
-#include <float.h>
-#include <math.h>
 
 enum { SPHERES_PER_ORIGIN = 4096, ORIGIN_COUNT = 64, SPHERE_COUNT = SPHERES_PER_ORIGIN * ORIGIN_COUNT };
 

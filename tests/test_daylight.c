@@ -3,10 +3,8 @@
 #include "host/scene/daylight.h"
 #include "host/scene/portable.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 TEST(days)
 {

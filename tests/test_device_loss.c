@@ -6,8 +6,6 @@
 #include "tests/failing/work.h"
 #include <pthread.h>
 #include <semaphore.h>
-#include <stdlib.h>
-#include <string.h>
 
 // Two renderers, as on two devices, of which the second renders in a thread. Each waits until the other has
 // taken a band, or the second has failed.

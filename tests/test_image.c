@@ -1,19 +1,13 @@
 // Writes and reads images: every format's round trip, notes, and failures that leave the old file unchanged.
-#include "host/base/text.h"
 #include "host/image/image.h"
 #include "tests/check.h"
 #include "tests/files.h"
 
-#include <math.h>
 #include <openexr.h>
 #include <png.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <turbojpeg.h>
-#include <unistd.h>
 
 static const ImageNote notes[] = {{"Software", "glint 1"}, {"Scene", "caf\xC3\xA9.yaml"}, {NULL, NULL}};
 

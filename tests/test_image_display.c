@@ -1,11 +1,7 @@
 // Tests exposure, the tone curve and the dither of PNG and PPM.
-#include "host/base/text.h"
 #include "host/image/display.h"
 #include "tests/check.h"
 #include "tests/files.h"
-
-#include <math.h>
-#include <string.h>
 
 enum { SIDE = 8 };
 

@@ -1,14 +1,10 @@
 // Reads EXR files as other programs write them: halves, every lossless compression, tiles, more channels than
 // three.
-#include "host/base/text.h"
 #include "host/image/image.h"
 #include "tests/check.h"
 #include "tests/files.h"
 
 #include <openexr.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 6 }; // at most
 

@@ -3,9 +3,6 @@
 #include "host/image/transfer.h"
 #include "tests/check.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 static uint32_t expected_quantized(float value, Transfer transfer, unsigned bits)
 {
     if (!(value > 0)) return 0;

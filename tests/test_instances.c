@@ -1,17 +1,13 @@
 // Tests that instances which share a mesh look as copies of it do, wherever and however they lie.
 //
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/compile/compile.h"
 #include "host/compile/instances.h"
 #include "host/render/render_job.h"
 #include "tests/check.h"
 #include "tests/files.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 enum { WIDTH = 83, HEIGHT = 47, SIDE = 24, TRIANGLES = 2 * SIDE * SIDE };
 

@@ -5,10 +5,8 @@
 // run_tests: sanitize-long-only
 #include "host/compile/transform.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_scene.h"
-#include <math.h>
 
 enum {
     SEEDS = 5, // the first two where tests are short

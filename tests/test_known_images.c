@@ -1,14 +1,10 @@
 // Renders images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the
 // hard cases.
 // run_tests: sanitize-long-only
-#include "host/base/text.h"
 #include "host/compile/camera_basis.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <float.h>
-#include <math.h>
 
 static Scene scene_of(const char *text)
 {

@@ -1,8 +1,6 @@
 // Checks that the structs that host and kernels share have the same layout on both sides. Compares their
 // sizes and the places of their members, as the device's compiler has them in float and in double, and their
 // values after the host's narrowing.
-#include "host/base/memory.h"
-#include "host/compile/compile.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

@@ -1,14 +1,9 @@
 // Checks that LeakSanitizer, in a sanitized build, finds what glint forgets to release, including OpenCL
 // objects, which the driver allocates. It must not blame glint for what the driver keeps.
-#include "host/base/memory.h"
 #include "host/opencl/compute.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #ifdef __SANITIZE_ADDRESS__
 #include <sanitizer/lsan_interface.h>

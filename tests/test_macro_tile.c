@@ -2,12 +2,9 @@
 // answer. The image must have the same bits with the BVH and without it.
 //
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
-#include <math.h>
 
 static Random random_state;
 

@@ -1,7 +1,6 @@
 // Tests meshes: what a file's triangles become, where they are placed, what is refused, and which ids they
 // get.
 #include "host/base/base64.h"
-#include "host/compile/compile.h"
 #include "host/compile/scene_bounds.h"
 #include "host/import/mesh/mesh_import.h"
 #include "tests/check.h"
@@ -9,7 +8,6 @@
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <signal.h>
-#include <unistd.h>
 
 #define CAMERA_AND_LIGHT                                                                                     \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"                                                   \

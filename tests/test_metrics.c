@@ -6,9 +6,6 @@
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 enum { SIDE = 64 };
 
 // Returns gray display values, as a PNG holds them.

@@ -1,18 +1,12 @@
 // Checks that a scene that was compiled for one eye and moved to another has the numbers of one compiled for
 // the other.
 // run_tests: sanitized
-#include "host/base/array.h"
 #include "host/base/parallel.h"
-#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <float.h>
-#include <math.h>
 #include <stdatomic.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { OBJECTS = 3 * FLAT_RANGE_MIN }; // of them some types are moved by several threads
 

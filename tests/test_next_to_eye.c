@@ -1,11 +1,8 @@
 // Tests that shapes next to the eye that rounding would move are stored relative to it, and that other
 // scenes' kernels pay nothing for this.
-#include "host/compile/compile.h"
 #include "host/compile/shapes.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <math.h>
-#include <string.h>
 
 static CompiledScene compile_for(const Scene *scene, Precision precision, bool shift_to_eye)
 {

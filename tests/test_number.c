@@ -4,12 +4,6 @@
 #include "host/import/number.h"
 #include "tests/check.h"
 
-#include <math.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 static void check(const char *text)
 {
     double value = NAN;

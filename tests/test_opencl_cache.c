@@ -1,18 +1,13 @@
 // Tests the kernel cache on disk, for which no device is needed.
-#include "host/base/array.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 static const char key[] = "device x\ntext y";
 static const char machine_code[] = "machine\0code\xff\n";

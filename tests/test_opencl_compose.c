@@ -3,8 +3,6 @@
 #include "host/opencl/compose.h"
 #include "tests/check.h"
 #include "tests/child.h"
-#include <stdlib.h>
-#include <string.h>
 
 static const EmbeddedFile files[] = {
     {"root.cl", "// root\n#include \"a.h\"\n  #  include \"kernels/b.h\" // again\n#include \"a.h\"\nlast"},

@@ -3,8 +3,6 @@
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
-#include <stdlib.h>
-#include <string.h>
 
 static Device fabricated(unsigned index, cl_device_type type, const char *name, const char *platform)
 {

@@ -2,13 +2,10 @@
 // must report that call and release everything, and the next render on the same device must be right.
 // run_tests: first
 // run_tests: sanitized
-#include "host/base/memory.h"
 #include "tests/check.h"
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"
 #include "tests/film.h"
-#include <stdlib.h>
-#include <string.h>
 
 // Fails a call. It must be reported if `is_needed`, else the work is done without it.
 static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)

@@ -10,11 +10,7 @@
 #include "tests/child.h"
 #include "tests/files.h"
 #include <ftw.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 // features.h has nothing for the device: the prelude is the kernel.
 static const char triple[] =

@@ -7,10 +7,8 @@
 #include "host/scene/oval.h"
 #include "host/verify/reference.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
-#include <math.h>
 
 enum { RAYS = 2000 };
 

@@ -2,8 +2,6 @@
 // without a device or a clock.
 #include "host/render/place.h"
 #include "tests/check.h"
-#include <stdlib.h>
-#include <string.h>
 
 enum { WIDTH = 640, HEIGHT = 360, ROWS_MAX = 512, FIRST_LAUNCH = 4096, GROWTH_MAX = 4 };
 

@@ -2,12 +2,8 @@
 // rendered at once. A preview's may differ by roundings.
 // run_tests: sanitize-long-only
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { WIDTH = 53, HEIGHT = 37, SAMPLES = 7, AOVS = AOV_T | AOV_OBJECT | AOV_SHADOW };
 

@@ -2,13 +2,9 @@
 // permits must be repaired to the correctly rounded ones. The fma of devices without one in hardware must
 // have fma's bits.
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
-#include <float.h>
-#include <math.h>
 
 enum { OPERAND_COUNT = 1 << 20, ARRAYS_MAX = 5 };
 

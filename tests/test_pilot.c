@@ -1,15 +1,10 @@
 // Tests the sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it
 // chooses.
-#include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { WIDTH = 71, HEIGHT = 50, CELL = 5 };
 

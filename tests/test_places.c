@@ -2,7 +2,6 @@
 #include "host/scene/describe.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <string.h>
 
 enum { OBJECTS_MAX = 4 };
 

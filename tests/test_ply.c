@@ -4,9 +4,6 @@
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #define SCENE                                                                                                \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \

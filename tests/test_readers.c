@@ -1,17 +1,11 @@
 // Feeds randomly damaged files to the readers of tests/fuzz/readers.c in a sanitized build. tools/fuzz
 // generates inputs guided by coverage. run_tests: sanitized
-#include "host/base/array.h"
-#include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/compile/random_shape.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/film.h"
 #include "tests/fuzz/readers.h"
 #include <glob.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 // A reader that takes longer for one input ends by SIGALRM.
 enum { SECONDS_MAX = 20, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };

@@ -1,8 +1,6 @@
 // Tests what glint report leaves out of its files.
 #include "host/cli/report_scrub.h"
 #include "tests/check.h"
-#include <stdlib.h>
-#include <string.h>
 #include <sys/utsname.h>
 
 TEST(texts_are_scrubbed)

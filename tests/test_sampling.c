@@ -2,12 +2,8 @@
 // same at every precision.
 //
 // run_tests: sanitize-long-only
-#include "host/base/memory.h"
 #include "tests/check.h"
 #include "tests/probe.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { COUNT = 4096 };
 

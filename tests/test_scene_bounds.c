@@ -3,8 +3,6 @@
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nobjects:\n"
 
 static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)

@@ -1,6 +1,5 @@
 // Checks that every scene of the tables in tests/broken, whose README describes their format, gets exactly
 // the messages next to it, and that every message has such a scene.
-#include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/check.h"
 #include "tests/files.h"
@@ -8,9 +7,6 @@
 
 #include <ctype.h>
 #include <dirent.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 enum { BROKEN_SCENES_MIN = 30, SETS_MAX = 40 };
 

@@ -2,9 +2,6 @@
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <string.h>
-
 #define CAMERA "=>camera :\n{\n\tposition 0 0 5\n\tlook_at 0 0 -1\n}\n"
 #define LIGHT  "=>light :\n{\n\tposition 0 9 0\n\tintensity 1 1 1\n}\n"
 #define SPHERE "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 0\n\tcolor 0 0 0\n\tdiffuse 1 1 1\n\tspecular 0\n}\n"

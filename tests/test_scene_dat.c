@@ -2,12 +2,8 @@
 // show, and an image against Tachyon's own pixels.
 #include "host/import/load.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-
-#include <math.h>
-#include <string.h>
 
 #define CAMERA_OF(projection, end)                                                                           \
     "camera " projection " zoom 1 aspectratio 1 antialiasing 0 raydepth 8\ncenter 0 0 -5 viewdir 0 0 1 "     \

@@ -3,9 +3,6 @@
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <stdio.h>
-#include <string.h>
-
 static Text page;
 
 static int page_read(void **state)

@@ -6,10 +6,7 @@
 #include "tests/files.h"
 #include "tests/scene_reading.h"
 
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
 #define LIGHTS "lights: [point: {position: [0, 9, 0]}]\n"

@@ -3,9 +3,6 @@
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <string.h>
-
 #define VIEW     "v\nfrom 0 0 -5\nat 0 0 0\nup 0 1 0\nangle 45\n"
 #define LIT      VIEW "l 0 9 0\n"
 #define MATERIAL "f 1 1 1 1 0 1 0 0\n"

@@ -1,12 +1,7 @@
 // Cuts polygons into triangles. Every point of the polygon must lie in exactly one, whatever its form.
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/scene/polygon.h"
 #include "tests/check.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 typedef ARRAY_OF(Vector3) Outline;
 

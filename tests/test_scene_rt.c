@@ -3,9 +3,6 @@
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <string.h>
-
 #define CAMERA "C 0,0,-5 0,0,1 60\n"
 #define LIT    CAMERA "L 0,9,0 1\n"
 #define SPHERE "sp 0,0,0 2 255,0,0\n"

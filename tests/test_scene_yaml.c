@@ -5,8 +5,6 @@
 #include "tests/files.h"
 #include "tests/scene_reading.h"
 
-#include <math.h>
-#include <string.h>
 #include <sys/stat.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"

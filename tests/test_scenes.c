@@ -1,11 +1,9 @@
 // Checks that every scene in scenes/ is read without a warning and renders to an image that is not blank.
 // Where tests are long, each scene has the kernel that glint builds for it.
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <glob.h>
-#include <math.h>
 
 enum { WIDTH = 64, HEIGHT = 36, COLORS_MIN = 16, SCENES_MIN = 12 };
 

@@ -1,13 +1,9 @@
 // Tests how rows are handed out to workers. Bands reach the sink in order from the top whatever the order
 // they end in, sizes follow the paces, and the rows of a failed worker go to the others.
-#include "host/base/memory.h"
 #include "host/render/scheduler.h"
 #include "tests/check.h"
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 enum { WIDTH = 4, ROWS = 64, STEP = 4, ROWS_MAX = 16, COMPONENTS = 3 };
 

@@ -1,14 +1,9 @@
 // Tests shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/verify/reference_color.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
-#include <string.h>
 
 // A veil's light is taken once, even in a tile whose shadow rays run to different sides and so traverse the
 // BVH in several packets, since the light is above the corner of a tile.

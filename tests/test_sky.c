@@ -1,12 +1,9 @@
 // Tests the sky as a light. Its cells must have the light of its colors, and what hides them must cast a
 // shadow.
-#include "host/base/array.h"
 #include "host/scene/sky.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 #define HEAD "camera: {position: [0, 0.5, 0], look_at: [0, 0, 0], up: [0, 0, -1], height: 1e-3}\n"
 

@@ -2,17 +2,13 @@
 // uses the renderer does. Its memory does not grow, and each image is that of a process that renders nothing
 // else. Long tests render 10,000 scenes.
 // run_tests: sanitize-long-only
-#include "host/base/array.h"
 #include "host/base/hash.h"
 #include "host/scene/mesh.h"
 #include "tests/check.h"
 #include "tests/child.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_scene.h"
 #include <malloc.h>
-#include <math.h>
-#include <unistd.h>
 
 enum {
     OBJECTS = 40,

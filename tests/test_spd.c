@@ -4,12 +4,8 @@
 // run_tests: sanitize-long-only
 #include "host/compile/flat_types.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-
-#include <math.h>
-#include <unistd.h>
 
 #define SPD "../shared/corpus/spd"
 

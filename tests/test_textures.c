@@ -1,15 +1,11 @@
 // Tests where textures lie on surfaces and how they are filtered, in closed form or against double here,
 // that bits are the same at every width, and the messages for textures that cannot be used.
-#include "host/compile/features.h"
 #include "host/image/image.h"
 #include "tests/check.h"
 #include "tests/files.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 #include <turbojpeg.h>
-#include <unistd.h>
 
 static char folder[] = "/tmp/glint-textures-XXXXXX";
 static char texture_path[64];

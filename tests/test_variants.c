@@ -6,10 +6,8 @@
 #include "host/compile/transform.h"
 #include "host/import/load.h"
 #include "tests/check.h"
-#include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <math.h>
 
 // Neither is a whole number of tiles of any width.
 enum { WIDTH = 71, HEIGHT = 41 };
