@@ -108,6 +108,29 @@ const Material *material_of(const Object *object)
     return &complete.materials.items[object->material];
 }
 
+// How many numbers and then flags a shape has in Object.as.
+static const struct {
+    size_t numbers, flags;
+} shape_members[] = {
+    [SHAPE_SPHERE] = {4, 1},   [SHAPE_PLANE] = {6, 0}, [SHAPE_DISC] = {7, 0},      [SHAPE_BOX] = {6, 0},
+    [SHAPE_CYLINDER] = {7, 3}, [SHAPE_CONE] = {9, 3},  [SHAPE_TRIANGLE] = {18, 1},
+};
+
+void check_shapes(const Object *objects, const Object *expected, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const ShapeType type = expected[i].type;
+        assert_int_equal(objects[i].type, type);
+        assert_true(type < COUNT_OF(shape_members));
+        const double *numbers = (const double *)&objects[i].as, *others = (const double *)&expected[i].as;
+        for (size_t k = 0; k < shape_members[type].numbers; k++)
+            if (fabs(numbers[k] - others[k]) > 1e-14 * fmax(1, fabs(others[k])))
+                fail_msg("object %zu, number %zu: %.17g, not %.17g", i, k, numbers[k], others[k]);
+        const size_t end = shape_members[type].numbers;
+        assert_memory_equal(numbers + end, others + end, shape_members[type].flags);
+    }
+}
+
 void check_near(double value, double expected, double tolerance, const char *file, int line)
 {
     if (fabs(value - expected) <= tolerance) return;

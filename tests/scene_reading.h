@@ -37,6 +37,10 @@ int complete_close(void **state);
 // Returns the material of an object of that scene.
 const Material *material_of(const Object *object);
 
+// Compares the shapes of objects, all of whose values count. Numbers may differ by the rounding of a few
+// operations.
+void check_shapes(const Object *objects, const Object *expected, size_t count);
+
 void check_number(double value, double expected, const char *file, int line);
 void check_near(double value, double expected, double tolerance, const char *file, int line);
 void check_vector(Vector3 vector, Vector3 expected, const char *file, int line);

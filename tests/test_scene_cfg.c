@@ -33,47 +33,29 @@ TEST(light)
     assert_vector(complete.lights.items[0].color, 0.5, 0.6, 0.7);
 }
 
-TEST(sphere)
+TEST(shapes)
 {
-    const Object *sphere = &complete.objects.items[0];
-    assert_int_equal(sphere->type, SHAPE_SPHERE);
-    assert_vector(sphere->as.sphere.center, 0, -3, -5);
-    assert_number(sphere->as.sphere.radius, 2.5);
-    assert_vector(material_of(sphere)->color, 1, 0.4, 0);
-    assert_number(material_of(sphere)->ambient, 1);
-    assert_vector(material_of(sphere)->diffuse, 0.5, 0.6, 0.7);
-    assert_number(material_of(sphere)->specular.largest, 1);
-    assert_number(material_of(sphere)->shininess, 30);
+    const Object expected[] = {
+        {SHAPE_SPHERE, .as.sphere = {{0, -3, -5}, 2.5}},
+        {SHAPE_PLANE, .as.plane = {{0, -6, 0}, {0, 1, 0}}},
+        {SHAPE_CYLINDER, .as.cylinder = {{3, 0, -9}, {0, 2, 0}, 1}},
+        {SHAPE_CONE, .as.cone = {{-3, 0, -9}, {1, 1, 0}, .slope = tan(0.5)}}, // the angle is in radians
+    };
+    assert_int_equal(complete.objects.count, COUNT_OF(expected));
+    check_shapes(complete.objects.items, expected, COUNT_OF(expected));
 }
 
-TEST(plane)
+TEST(materials)
 {
-    const Object *plane = &complete.objects.items[1];
-    assert_int_equal(plane->type, SHAPE_PLANE);
-    assert_vector(plane->as.plane.point, 0, -6, 0);
-    assert_vector(plane->as.plane.normal, 0, 1, 0);
-    assert_vector(material_of(plane)->color, 0, 0, 1);
-}
-
-TEST(cylinder)
-{
-    const Object *cylinder = &complete.objects.items[2];
-    assert_int_equal(cylinder->type, SHAPE_CYLINDER);
-    assert_false(cylinder->as.cylinder.finite);
-    assert_vector(cylinder->as.cylinder.from, 3, 0, -9);
-    assert_vector(cylinder->as.cylinder.axis, 0, 2, 0);
-    assert_number(cylinder->as.cylinder.radius, 1);
-    assert_number(material_of(cylinder)->specular.largest, 0.25);
-}
-
-TEST(cone)
-{
-    const Object *cone = &complete.objects.items[3];
-    assert_int_equal(cone->type, SHAPE_CONE);
-    assert_false(cone->as.cone.finite);
-    assert_vector(cone->as.cone.from, -3, 0, -9);
-    assert_vector(cone->as.cone.axis, 1, 1, 0);
-    assert_number(cone->as.cone.slope, tan(0.5)); // the angle is in radians
+    const Object *objects = complete.objects.items;
+    const Material *sphere = material_of(&objects[0]);
+    assert_vector(sphere->color, 1, 0.4, 0);
+    assert_number(sphere->ambient, 1);
+    assert_vector(sphere->diffuse, 0.5, 0.6, 0.7);
+    assert_number(sphere->specular.largest, 1);
+    assert_number(sphere->shininess, 30);
+    assert_vector(material_of(&objects[1])->color, 0, 0, 1);
+    assert_number(material_of(&objects[2])->specular.largest, 0.25);
 }
 
 TEST(any_order_and_blanks)

@@ -95,41 +95,39 @@ TEST(materials)
 
 TEST(shapes)
 {
-    const Object *objects = complete.objects.items;
-    assert_int_equal(complete.objects.count, 16);
-    assert_int_equal(objects[0].type, SHAPE_SPHERE);
-    assert_vector(objects[0].as.sphere.center, 1, 2, -3);
-    assert_number(objects[0].as.sphere.radius, 4);
-    assert_int_equal(objects[1].type, SHAPE_PLANE);
-    assert_vector(objects[1].as.plane.point, 1, 2, -3);
-    assert_vector(objects[1].as.plane.normal, 0, 1, -2);
-    assert_int_equal(objects[2].type, SHAPE_CYLINDER);
-    assert_vector(objects[2].as.cylinder.axis, 1, 0, 1);
-    assert_false(objects[2].as.cylinder.finite);
-    assert_int_equal(objects[3].type, SHAPE_CYLINDER);
-    assert_vector(objects[3].as.cylinder.from, 1, 2, -3);
-    assert_vector(objects[3].as.cylinder.axis, 0, 2, -1);
-    assert_true(objects[3].as.cylinder.finite);
-    assert_false(objects[3].as.cylinder.caps);
-    assert_int_equal(objects[4].type, SHAPE_DISC);
-    assert_vector(objects[4].as.disc.normal, 0, 0, -2);
-    assert_number(objects[4].as.disc.radius, 3);
-    assert_int_equal(objects[5].type, SHAPE_BOX);
-    assert_vector(objects[5].as.box.min, 1, 2, -6);
-    assert_vector(objects[5].as.box.max, 4, 5, -3);
-    for (size_t i = 6; i < 9; i++) {
-        assert_int_equal(objects[i].type, SHAPE_TRIANGLE);
-        assert_vector(objects[i].as.triangle.vertices[1], 1, 0, -2);
-        assert_int_equal(objects[i].as.triangle.smooth, i > 6);
-        if (i > 6) assert_vector(objects[i].as.triangle.normals[0], 1, 0, -1);
+#define CORNERS                                                                                              \
+    {                                                                                                        \
+        {0, 0, -1}, {1, 0, -2},                                                                              \
+        {                                                                                                    \
+            0, 1, -3                                                                                         \
+        }                                                                                                    \
     }
-    static const ShapeType beads[] = {SHAPE_SPHERE, SHAPE_SPHERE, SHAPE_CYLINDER, SHAPE_SPHERE,
-                                      SHAPE_CYLINDER};
-    for (size_t i = 0; i < 5; i++)
-        assert_int_equal(objects[9 + i].type, beads[i]);
-    assert_vector(objects[12].as.sphere.center, 1, 1, -2);
-    assert_vector(objects[13].as.cylinder.from, 1, 1, -2);
-    assert_vector(objects[13].as.cylinder.axis, -1, 0, 1);
+#define NORMALS                                                                                              \
+    {                                                                                                        \
+        {1, 0, -1}, {0, 1, -1},                                                                              \
+        {                                                                                                    \
+            0, 0, -1                                                                                         \
+        }                                                                                                    \
+    }
+    static const Object expected[] = {
+        {SHAPE_SPHERE, .as.sphere = {{1, 2, -3}, 4}},
+        {SHAPE_PLANE, .as.plane = {{1, 2, -3}, {0, 1, -2}}},
+        {SHAPE_CYLINDER, .as.cylinder = {{1, 2, -3}, {1, 0, 1}, 0.5}},
+        {SHAPE_CYLINDER, .as.cylinder = {{1, 2, -3}, {0, 2, -1}, 0.5, .finite = true}},
+        {SHAPE_DISC, .as.disc = {{1, 2, -3}, {0, 0, -2}, 3}},
+        {SHAPE_BOX, .as.box = {{1, 2, -6}, {4, 5, -3}}},
+        {SHAPE_TRIANGLE, .as.triangle.vertices = CORNERS},
+        {SHAPE_TRIANGLE, .as.triangle = {CORNERS, NORMALS, .smooth = true}},
+        {SHAPE_TRIANGLE, .as.triangle = {CORNERS, NORMALS, .smooth = true}},
+        // a polycylinder
+        {SHAPE_SPHERE, .as.sphere = {{0, 0, 0}, 0.25}},
+        {SHAPE_SPHERE, .as.sphere = {{0, 1, -1}, 0.25}},
+        {SHAPE_CYLINDER, .as.cylinder = {{0, 1, -1}, {0, -1, 1}, 0.25, .finite = true}},
+        {SHAPE_SPHERE, .as.sphere = {{1, 1, -2}, 0.25}},
+        {SHAPE_CYLINDER, .as.cylinder = {{1, 1, -2}, {-1, 0, 1}, 0.25, .finite = true}},
+    };
+    assert_int_equal(complete.objects.count, 16);
+    check_shapes(complete.objects.items, expected, COUNT_OF(expected));
 }
 
 TEST(meshes)

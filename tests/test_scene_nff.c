@@ -66,36 +66,15 @@ TEST(materials)
 
 TEST(round_shapes)
 {
-    const Object *objects = complete.objects.items;
-    assert_int_equal(objects[0].type, SHAPE_SPHERE);
-    assert_vector(objects[0].as.sphere.center, 1, 2, 3);
-    assert_number(objects[0].as.sphere.radius, 4);
-    assert_false(objects[0].as.sphere.only_inside);
-    assert_number(objects[1].as.sphere.radius, 4);
-    assert_true(objects[1].as.sphere.only_inside);
-
-    assert_int_equal(objects[2].type, SHAPE_CYLINDER);
-    assert_vector(objects[2].as.cylinder.axis, 0, 3, 0);
-    assert_number(objects[2].as.cylinder.radius, 2);
-    assert_true(objects[2].as.cylinder.finite);
-    assert_false(objects[2].as.cylinder.caps);
-    assert_false(objects[2].as.cylinder.only_inside);
-
-    assert_int_equal(objects[3].type, SHAPE_CONE);
-    assert_number(objects[3].as.cone.radius[0], 2);
-    assert_number(objects[3].as.cone.radius[1], 0.5);
-    assert_true(objects[3].as.cone.finite);
-    assert_false(objects[3].as.cone.caps);
-    assert_false(objects[3].as.cone.only_inside);
-
-    assert_int_equal(objects[4].type, SHAPE_CYLINDER);
-    assert_number(objects[4].as.cylinder.radius, 2);
-    assert_true(objects[4].as.cylinder.only_inside);
-
-    assert_int_equal(objects[5].type, SHAPE_CONE);
-    assert_number(objects[5].as.cone.radius[0], 0);
-    assert_number(objects[5].as.cone.radius[1], 1);
-    assert_true(objects[5].as.cone.only_inside);
+    static const Object expected[] = {
+        {SHAPE_SPHERE, .as.sphere = {{1, 2, 3}, 4}},
+        {SHAPE_SPHERE, .as.sphere = {{1, 2, 3}, 4, .only_inside = true}},
+        {SHAPE_CYLINDER, .as.cylinder = {{0, 0, 0}, {0, 3, 0}, 2, .finite = true}},
+        {SHAPE_CONE, .as.cone = {{0, 0, 0}, {0, 3, 0}, {2, 0.5}, .finite = true}},
+        {SHAPE_CYLINDER, .as.cylinder = {{0, 0, 0}, {0, 3, 0}, 2, .finite = true, .only_inside = true}},
+        {SHAPE_CONE, .as.cone = {{0, 0, 0}, {0, 3, 0}, {0, 1}, .finite = true, .only_inside = true}},
+    };
+    check_shapes(complete.objects.items, expected, COUNT_OF(expected));
 }
 
 static double triangle_area(const Object *triangle)

@@ -40,57 +40,36 @@ TEST(lights)
     assert_vector(lights[2].color, 0, 0, 0.25);
 }
 
-TEST(sphere_and_plane)
+TEST(shapes)
 {
-    const Object *sphere = &complete.objects.items[0], *plane = sphere + 1;
-    assert_int_equal(sphere->type, SHAPE_SPHERE);
-    assert_vector(sphere->as.sphere.center, 1, 2, 3);
-    assert_number(sphere->as.sphere.radius, 2);
-    assert_vector(material_of(sphere)->color, 1, 0, 0);
-    assert_number(material_of(sphere)->specular.largest, 0.5);
-    assert_number(material_of(sphere)->shininess, 10);
-    assert_int_equal(plane->type, SHAPE_PLANE);
-    assert_vector(plane->as.plane.point, 0, -1, 0);
-    assert_vector(plane->as.plane.normal, 0, 1, 0);
-    assert_vector(material_of(plane)->color, 0, 1, 0);
-    assert_vector(material_of(plane)->diffuse, 1, 1, 1);
-    assert_number(material_of(plane)->ambient, 1);
-    assert_number(material_of(plane)->specular.largest, 0);
+    static const Object expected[] = {
+        {SHAPE_SPHERE, .as.sphere = {{1, 2, 3}, 2}},
+        {SHAPE_PLANE, .as.plane = {{0, -1, 0}, {0, 1, 0}}},
+        // the file gives a cylinder's center
+        {SHAPE_CYLINDER, .as.cylinder = {{1, -1, 3}, {0, 6, 0}, 1, .finite = true, .caps = true}},
+        {SHAPE_TRIANGLE, .as.triangle.vertices = {{-1, 0, 3}, {3, 0, 3}, {3, 4, 3}}},
+        {SHAPE_TRIANGLE, .as.triangle.vertices = {{-1, 0, 3}, {3, 4, 3}, {-1, 4, 3}}},
+        {SHAPE_TRIANGLE, .as.triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
+        {SHAPE_CONE, .as.cone = {{1, 2, 3}, {3, 0, 0}, {2, 0}, .finite = true, .caps = true}},
+    };
+    assert_int_equal(complete.objects.count, COUNT_OF(expected));
+    check_shapes(complete.objects.items, expected, COUNT_OF(expected));
 }
 
-TEST(cylinder_and_cone)
+TEST(materials)
 {
-    const Object *cylinder = &complete.objects.items[2], *cone = &complete.objects.items[6];
-    assert_int_equal(cylinder->type, SHAPE_CYLINDER);
-    assert_vector(cylinder->as.cylinder.from, 1, -1, 3); // its center is given
-    assert_vector(cylinder->as.cylinder.axis, 0, 6, 0);
-    assert_number(cylinder->as.cylinder.radius, 1);
-    assert_true(cylinder->as.cylinder.finite && cylinder->as.cylinder.caps);
-    assert_number(material_of(cylinder)->specular.largest, 0.25);
-    assert_int_equal(cone->type, SHAPE_CONE);
-    assert_vector(cone->as.cone.from, 1, 2, 3);
-    assert_vector(cone->as.cone.axis, 3, 0, 0);
-    assert_number(cone->as.cone.radius[0], 2);
-    assert_number(cone->as.cone.radius[1], 0);
-    assert_true(cone->as.cone.finite && cone->as.cone.caps);
-}
-
-TEST(square_and_triangle)
-{
-    const Object *first = &complete.objects.items[3], *second = first + 1, *triangle = first + 2;
-    assert_int_equal(first->type, SHAPE_TRIANGLE);
-    assert_int_equal(first->material, second->material);
-    assert_vector(material_of(first)->color, 0.2, 0.4, 0.6);
-    assert_vector(first->as.triangle.vertices[0], -1, 0, 3);
-    assert_vector(first->as.triangle.vertices[1], 3, 0, 3);
-    assert_vector(first->as.triangle.vertices[2], 3, 4, 3);
-    assert_vector(second->as.triangle.vertices[0], -1, 0, 3);
-    assert_vector(second->as.triangle.vertices[1], 3, 4, 3);
-    assert_vector(second->as.triangle.vertices[2], -1, 4, 3);
-    assert_int_equal(triangle->type, SHAPE_TRIANGLE);
-    assert_false(triangle->as.triangle.smooth);
-    assert_vector(triangle->as.triangle.vertices[1], 1, 0, 0);
-    assert_int_equal(complete.objects.count, 7);
+    const Object *objects = complete.objects.items;
+    const Material *first = material_of(&objects[0]), *second = material_of(&objects[1]);
+    assert_vector(first->color, 1, 0, 0);
+    assert_number(first->specular.largest, 0.5);
+    assert_number(first->shininess, 10);
+    assert_vector(second->color, 0, 1, 0);
+    assert_vector(second->diffuse, 1, 1, 1);
+    assert_number(second->ambient, 1);
+    assert_number(second->specular.largest, 0);
+    assert_number(material_of(&objects[2])->specular.largest, 0.25);
+    assert_int_equal(objects[3].material, objects[4].material); // a square's triangles
+    assert_vector(material_of(&objects[3])->color, 0.2, 0.4, 0.6);
 }
 
 TEST(square_on_the_floor)

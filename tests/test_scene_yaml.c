@@ -147,76 +147,30 @@ TEST(energy)
                     "warning: a.yaml: no objects\nwarning: a.yaml: no lights\n");
 }
 
-TEST(round_shapes)
+TEST(shapes)
 {
-    const Object *sphere = &complete.objects.items[0], *plane = sphere + 1, *disc = sphere + 2;
-    assert_int_equal(sphere->type, SHAPE_SPHERE);
-    assert_int_equal(sphere->material, 0);
-    assert_vector(sphere->as.sphere.center, 0, 1, 0);
-    assert_number(sphere->as.sphere.radius, 1);
-    assert_int_equal(plane->type, SHAPE_PLANE);
-    assert_int_equal(plane->material, 1);
-    assert_vector(plane->as.plane.point, 0, -1, 0);
-    assert_vector(plane->as.plane.normal, 0, 2, 0);
-    assert_int_equal(disc->type, SHAPE_DISC);
-    assert_int_equal(disc->material, 2); // the default
-    assert_vector(disc->as.disc.center, 1, 2, 3);
-    assert_vector(disc->as.disc.normal, 0, 0, -1);
-    assert_number(disc->as.disc.radius, 0.5);
-}
-
-TEST(cylinders)
-{
-    const Object *open = &complete.objects.items[4], *capped = open + 1, *infinite = open + 2;
-    assert_int_equal(open->type, SHAPE_CYLINDER);
-    assert_vector(open->as.cylinder.from, 1, 0, 0);
-    assert_vector(open->as.cylinder.axis, 0, 3, 0);
-    assert_number(open->as.cylinder.radius, 0.25);
-    assert_true(open->as.cylinder.finite);
-    assert_false(open->as.cylinder.caps);
-    assert_true(capped->as.cylinder.caps);
-    assert_false(infinite->as.cylinder.finite);
-    assert_false(infinite->as.cylinder.caps);
-    assert_vector(infinite->as.cylinder.from, 3, 0, 0);
-    assert_vector(infinite->as.cylinder.axis, 0, 0, 5);
-    assert_int_equal(infinite->material, 4); // an alias of an inline material is a separate material
+    static const Object expected[] = {
+        {SHAPE_SPHERE, .as.sphere = {{0, 1, 0}, 1}},
+        {SHAPE_PLANE, .as.plane = {{0, -1, 0}, {0, 2, 0}}},
+        {SHAPE_DISC, .as.disc = {{1, 2, 3}, {0, 0, -1}, 0.5}},
+        {SHAPE_BOX, .as.box = {{-1, -2, -3}, {1, 2, 3}}},
+        {SHAPE_CYLINDER, .as.cylinder = {{1, 0, 0}, {0, 3, 0}, 0.25, .finite = true}},
+        {SHAPE_CYLINDER, .as.cylinder = {{2, 0, 0}, {0, 3, 0}, 0.25, .finite = true, .caps = true}},
+        {SHAPE_CYLINDER, .as.cylinder = {{3, 0, 0}, {0, 0, 5}, 0.75}},
+        {SHAPE_CONE, .as.cone = {{0, 0, 1}, {0, 4, 0}, {1, 0.5}, .finite = true, .caps = true}},
+        {SHAPE_CONE, .as.cone = {{0, 0, 1}, {0, 4, 0}, {1, 0}, .finite = true}},
+        {SHAPE_CONE, .as.cone = {{0, 0, 2}, {3, 0, 0}, .slope = 1}},
+        {SHAPE_TRIANGLE, .as.triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
+        {SHAPE_TRIANGLE,
+         .as.triangle = {{{0, 0, 1}, {1, 0, 1}, {0, 1, 1}}, {{0, 0, -1}, {0, 1, -1}, {1, 0, -1}}, true}},
+    };
+    // the default material is the third, and an alias of an inline material is a separate one
+    static const uint32_t materials[] = {0, 1, 2, 3, 2, 2, 4, 2, 2, 2, 2, 0};
+    assert_int_equal(complete.objects.count, COUNT_OF(expected));
+    check_shapes(complete.objects.items, expected, COUNT_OF(expected));
+    for (size_t i = 0; i < COUNT_OF(materials); i++)
+        assert_int_equal(complete.objects.items[i].material, materials[i]);
     assert_number(complete.materials.items[4].shininess, 64);
-}
-
-TEST(cones)
-{
-    const Object *frustum = &complete.objects.items[7], *tip = frustum + 1, *infinite = frustum + 2;
-    assert_int_equal(frustum->type, SHAPE_CONE);
-    assert_vector(frustum->as.cone.from, 0, 0, 1);
-    assert_vector(frustum->as.cone.axis, 0, 4, 0);
-    assert_number(frustum->as.cone.radius[0], 1);
-    assert_number(frustum->as.cone.radius[1], 0.5);
-    assert_true(frustum->as.cone.finite);
-    assert_true(frustum->as.cone.caps);
-    assert_number(tip->as.cone.radius[1], 0);
-    assert_false(tip->as.cone.caps);
-    assert_false(infinite->as.cone.finite);
-    assert_false(infinite->as.cone.caps);
-    assert_vector(infinite->as.cone.from, 0, 0, 2);
-    assert_vector(infinite->as.cone.axis, 3, 0, 0);
-    assert_number(infinite->as.cone.slope, 1);
-}
-
-TEST(flat_shapes)
-{
-    const Object *box = &complete.objects.items[3], *flat = &complete.objects.items[10], *smooth = flat + 1;
-    assert_int_equal(box->type, SHAPE_BOX);
-    assert_vector(box->as.box.min, -1, -2, -3);
-    assert_vector(box->as.box.max, 1, 2, 3);
-    assert_int_equal(box->material, 3);
-    assert_int_equal(flat->type, SHAPE_TRIANGLE);
-    assert_false(flat->as.triangle.smooth);
-    assert_vector(flat->as.triangle.vertices[1], 1, 0, 0);
-    assert_vector(flat->as.triangle.vertices[2], 0, 1, 0);
-    assert_true(smooth->as.triangle.smooth);
-    assert_vector(smooth->as.triangle.normals[1], 0, 1, -1);
-    assert_vector(smooth->as.triangle.normals[2], 1, 0, -1);
-    assert_int_equal(smooth->material, 0);
 }
 
 TEST(defaults)
