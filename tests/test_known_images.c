@@ -1,7 +1,5 @@
-// Renders images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the
-// hard cases.
+// Renders images whose every value is known in closed form and that are not among the hard cases.
 // run_tests: sanitize-long-only
-#include "host/compile/camera_basis.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
@@ -123,35 +121,6 @@ TEST_AT_EACH_PRECISION(light_above_plane)
     check(near(shiny.color[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));
 }
 
-// R1: a sphere on a plane under a light has a shadow with the radius 10 / sqrt(80) that reaches the contact.
-TEST_AT_EACH_PRECISION(contact_shadow)
-{
-    OwnedScene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
-                                "lights: [{point: {position: [0, 10, 0]}}]\n"
-                                "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-                                "  - sphere: {center: [0, 1, 0], radius: 1}\n");
-    OwnedFilm film = render(&scene, 480, 360, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW);
-    const double edge = 10 / sqrt(80.0);
-    size_t dark = 0, bright = 0;
-    for (size_t i = 0; i < (size_t)480 * 360; i++) {
-        if (film.object[i] == UINT32_MAX) continue;
-        Vector3 p = film_place(&film, &scene, i);
-        bool lit = film.shadow[i] == 0;
-        check(lit == (film.color[3 * i] > 0));
-        if (film.object[i] == 0) {
-            double distance = hypot(p.x, p.z);
-            if (distance < edge * (1 - 1e-5)) check(!lit);
-            if (distance > edge * (1 + 1e-5)) check(lit);
-        } else {
-            Vector3 to_light = vector_normalize(vector_subtract((Vector3){0, 10, 0}, p));
-            double facing = vector_dot((Vector3){p.x, p.y - 1, p.z}, to_light);
-            if (fabs(facing) > 1e-5) check(lit == (facing > 0));
-        }
-        *(lit ? &bright : &dark) += 1;
-    }
-    check(dark > 1000 && bright > 10000);
-}
-
 // A spot shines straight down on a plane from height 5. The cone of 30 degrees intersects it in a circle of
 // radius 5 tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
 TEST_AT_EACH_PRECISION(spot_cone)
@@ -206,7 +175,7 @@ static long double highlight_of(const Film *film, const Scene *scene, size_t pix
     return s >= 1 ? 0 : expl((long double)shininess * log1pl(-s));
 }
 
-// R5: highlights of every sharpness on a sphere are never below 0 nor above ks, nor NaN. Light and eye are
+// Highlights of every sharpness on a sphere are never below 0 nor above ks, nor NaN. Light and eye are
 // as far from the center, so that the peak is halfway between. The field of view narrows with the highlight.
 TEST_AT_EACH_PRECISION(highlight)
 {
@@ -238,43 +207,6 @@ TEST_AT_EACH_PRECISION(highlight)
             if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
         }
         check(brightest > 1 - 1e-3);
-    }
-}
-
-// P2: no pixel of a tilted plane of size S, at distance O from the world's origin under a low sun, shadows
-// itself.
-TEST_AT_EACH_PRECISION(tilted_plane)
-{
-    static const double pairs[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
-    static const double elevations[] = {0.01, 1, 45};
-    const Vector3 n = vector_normalize((Vector3){1, 2, 3});
-    const Vector3 e = vector_normalize(vector_cross(n, (Vector3){1, 0, 0}));
-    OwnedScene scene =
-        scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
-                 "lights: [{directional: {direction: [0, 0, 1]}}]\n"
-                 "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
-    for (size_t i = 0; i < COUNT_OF(pairs); i++) {
-        double size = pairs[i][0], offset = pairs[i][1];
-        Vector3 p = {0.3 * size + offset, -0.2 * size - 2 * offset, 0.5 * size + 0.5 * offset};
-        scene.objects.items[0].as.plane.point = p;
-        scene.camera.look_at = p;
-        scene.camera.position =
-            vector_add(p, vector_add(vector_scale(n, 3 * size), vector_scale(e, 0.5 * size)));
-        for (size_t k = 0; k < COUNT_OF(elevations); k++) {
-            snprintf(place, sizeof place, "%s, S %g, O %g, sun at %g degrees", precision_names[precision],
-                     size, offset, elevations[k]);
-            double angle = elevations[k] * M_PI / 180;
-            scene.lights.items[0].direction =
-                vector_add(vector_scale(n, -sin(angle)), vector_scale(e, -cos(angle)));
-            OwnedFilm film = render(&scene, 128, 128, precision, AOV_SHADOW | AOV_OBJECT);
-            for (size_t pixel = 0; pixel < (size_t)128 * 128; pixel++) {
-                check(film.object[pixel] == 0);
-                check(film.shadow[pixel] == 0);
-                check(film.color[3 * pixel] == film.color[0]);
-            }
-            check(film.color[0] > 0);
-            check(near(film.color[0], 0.75 * sin(angle), precision == PRECISION_DOUBLE ? 1e-15 : 2e-7));
-        }
     }
 }
 
@@ -345,17 +277,6 @@ TEST_AT_EACH_PRECISION(ground_horizon)
     }
 }
 
-static double basis_error(const Camera *camera)
-{
-    CameraBasis basis = camera_basis(camera, 200, 100);
-    Vector3 axes[3] = {vector_normalize(basis.right), vector_normalize(basis.up), basis.forward};
-    double error = fabs(vector_length(basis.right) - vector_length(basis.up)) / vector_length(basis.up);
-    for (size_t i = 0; i < 3; i++)
-        for (size_t k = 0; k < 3; k++)
-            error = fmax(error, fabs(vector_dot(axes[i], axes[k]) - (i == k)));
-    return error;
-}
-
 // Between two parallel panes that reflect and transmit all light each hit adds the ambient light, 1/512, and
 // leaves one pending ray to the background, which is also 1/512.
 #define PANES                                                                                                \
@@ -369,9 +290,7 @@ static double basis_error(const Camera *camera)
 
 static uint64_t panes_render(bool transparent, Precision precision, uint32_t lanes, uint32_t bounces)
 {
-    char text[1024];
-    snprintf(text, sizeof text, PANES, transparent ? ", transmission: 1, ior: 1.5" : "");
-    OwnedScene scene = scene_of(text);
+    OwnedScene scene = scene_of(formatted(PANES, transparent ? ", transmission: 1, ior: 1.5" : ""));
     RenderSettings settings = film_settings(5, 3, precision);
     settings.extra_features = 0;
     settings.lanes = lanes;
@@ -406,64 +325,6 @@ TEST(facing_panes)
         at_each_precision(depth_of_facing_panes);
     else
         depth_of_facing_panes(PRECISION_SINGLE);
-}
-
-// R8: cameras that leave the basis open, or nearly so, still have one, and the same on every device.
-TEST(degenerate_cameras)
-{
-    static const struct {
-        const char *name;
-        Vector3 look_at, up;
-    } cameras[] = {
-        {"up parallel", {0, 0, 3}, {0, 0, 1}},
-        {"up antiparallel", {0, 0, 3}, {0, 0, -5}},
-        {"up zero", {0, 0, 3}, {0, 0, 0}},
-        {"up nearly parallel", {0, 0, 3}, {1e-7, 0, 1}},
-        {"straight down", {0, -1, 0}, {0, 1, 0}},
-        {"straight up", {0, 1, 0}, {0, 1, 0}},
-        {"tilted, up parallel", {1, 2, 3}, {1, 2, 3}},
-        {"huge up", {0, 0, 3}, {0, 1e300, 0}},
-        {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
-    };
-    OwnedFilm unrolled = {0};
-    for (size_t i = 0; i < COUNT_OF(cameras); i++) {
-        snprintf(place, sizeof place, "%s", cameras[i].name);
-        OwnedScene scene =
-            scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
-                     "objects: [{box: {min: [-4, -4, -4], max: [4, 4, 4], material: {checker: {colors: "
-                     "[[1, 1, 1], [0.5, 0, 0]], size: 1.1}}}}]\n");
-        scene.camera.look_at = cameras[i].look_at;
-        scene.camera.up = cameras[i].up;
-        check(basis_error(&scene.camera) <= 1e-6);
-        Film film = render(&scene, 41, 31, PRECISION_SINGLE, AOV_OBJECT);
-        for (size_t pixel = 0; pixel < (size_t)41 * 31; pixel++)
-            check(film.object[pixel] == 0);
-        // one fallback for the three that leave the roll open
-        if (i == 0)
-            unrolled = film;
-        else if (i <= 2)
-            film_assert_same(&film, &unrolled, place);
-        if (i > 0) film_free(&film);
-    }
-}
-
-// R8: a single pixel looks along the view, and extreme fields of view stay finite.
-TEST(single_pixel_and_extreme_fields)
-{
-    OwnedScene scene =
-        scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
-                 "ambient: [1, 1, 1]\nobjects: [{sphere: {center: [0, 0, 0], radius: 0.001}}]\n");
-    static const double fields[] = {1e-3, 50, 179.9};
-    for (size_t i = 0; i < 3; i++) {
-        snprintf(place, sizeof place, "fov %g", fields[i]);
-        scene.camera.half_tangent = tan(fields[i] * M_PI / 360);
-        OwnedFilm film = render(&scene, 1, 1, PRECISION_SINGLE, AOV_OBJECT | AOV_T);
-        check(film.object[0] == 0 && film.color[0] == 1);
-        check(near(film.t[0], sqrt(54) - 0.001, 1e-5));
-        OwnedFilm wide = render(&scene, 51, 33, PRECISION_SINGLE, AOV_OBJECT);
-        check(wide.object[16 * 51 + 25] == 0);
-        check((wide.object[0] == 0) == (fields[i] == 1e-3));
-    }
 }
 
 // The eye is the origin, so that the same scene 2^23 away has the same bits.
