@@ -80,6 +80,14 @@ TEST(passes_stop)
     renderer_close(renderer);
 }
 
+// Checks the image that a renderer which is already open makes.
+static void check_render(Renderer *renderer, const Film *expected, const char *what)
+{
+    OwnedFilm film;
+    assert_true(renderer_render_film(renderer, expected->t ? AOVS : 0, &film));
+    film_assert_same(&film, expected, what);
+}
+
 static void check_moved_renderer(bool moves)
 {
     OwnedScene scene = scene_of_file("scenes/globe.yaml");
@@ -88,20 +96,17 @@ static void check_moved_renderer(bool moves)
     settings.bvh = BVH_ON;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
-    Film film;
-    assert_true(renderer_render_film(renderer, AOVS, &film)); // its kernels take the new arrays
-    film_free(&film);
+    OwnedFilm first;
+    assert_true(renderer_render_film(renderer, AOVS, &first)); // its kernels take the new arrays
     double build_seconds = renderer_report(renderer)->build_seconds;
 
     scene.camera.position = vector_add(scene.camera.position, (Vector3){0.3, 0.2, -0.1});
     settings.width = settings.region_width = HEIGHT;
     settings.sample_count = SAMPLES;
     assert_true(renderer_move(renderer, &scene, &settings, &messages));
-    assert_true(renderer_render_film(renderer, AOVS, &film));
-    assert_true(renderer_report(renderer)->build_seconds == build_seconds);
     OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOVS);
-    film_assert_same(&film, &expected, "moved");
-    film_free(&film);
+    check_render(renderer, &expected, "moved");
+    assert_true(renderer_report(renderer)->build_seconds == build_seconds);
 
     // a camera that does not fit leaves the renderer as it was
     const Camera camera = scene.camera;
@@ -110,14 +115,10 @@ static void check_moved_renderer(bool moves)
     assert_false(renderer_move(renderer, &scene, &settings, &messages));
     assert_int_equal(message_count(&messages, MESSAGE_ERROR), 1);
     message_list_free(&messages);
-    assert_true(renderer_render_film(renderer, AOVS, &film));
-    film_assert_same(&film, &expected, "after a camera that does not fit");
-    film_free(&film);
+    check_render(renderer, &expected, "after a camera that does not fit");
     scene.camera = camera;
     assert_true(renderer_move(renderer, &scene, &settings, &messages));
-    assert_true(renderer_render_film(renderer, AOVS, &film));
-    film_assert_same(&film, &expected, "back from a camera that does not fit");
-    film_free(&film);
+    check_render(renderer, &expected, "back from a camera that does not fit");
     renderer_close(renderer);
 }
 
@@ -132,15 +133,14 @@ TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
     const RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
     OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(&compute, &scene, &settings, &messages);
-    OwnedFilm film, expected = film_render(&compute, &scene, &settings, AOVS);
+    OwnedFilm expected = film_render(&compute, &scene, &settings, AOVS);
     small.memory_bytes = 1 << 28;
     while (renderer_move(renderer, &scene, &settings, &messages))
         small.memory_bytes -= small.memory_bytes / 16; // in double the scene needs more
     scene.camera.position.x += 1;
     assert_false(renderer_move(renderer, &scene, &settings, &messages));
     small.memory_bytes = probe_compute.device->memory_bytes;
-    assert_true(renderer_render_film(renderer, AOVS, &film));
-    film_assert_same(&film, &expected, "after a scene that does not fit");
+    check_render(renderer, &expected, "after a scene that does not fit");
     renderer_close(renderer);
 }
 
@@ -165,7 +165,7 @@ static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
     scene.camera.position.x += 0.1;
     settings.is_preview = true;
     assert_true(renderer_move(renderer, &scene, &settings, &messages));
-    Film film, expected = film_render(&probe_compute, &scene, &settings, AOVS);
+    OwnedFilm film, expected = film_render(&probe_compute, &scene, &settings, AOVS);
     assert_true(renderer_render_film(renderer, AOVS, &film));
     const size_t count = film_pixel_count(&film);
     size_t others = 0, rounded = 0;
@@ -176,14 +176,10 @@ static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
         others += !is_same || fabs(film.t[i] - expected.t[i]) > 1e-3 * expected.t[i];
     }
     assert_true(others <= count / 200); // at outlines
-    film_free(&film);
 
     settings.is_preview = false;
     assert_true(renderer_move(renderer, &scene, &settings, &messages));
-    assert_true(renderer_render_film(renderer, AOVS, &film));
-    film_assert_same(&film, &expected, "after a preview");
-    film_free(&film);
-    film_free(&expected);
+    check_render(renderer, &expected, "after a preview");
     renderer_close(renderer);
     scene_free(&scene);
     return rounded;
@@ -219,9 +215,8 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
     for (size_t i = 0; i < 4; i++) {
         scene.camera.position.z = i % 2 ? 0.3749 : -4;
         assert_true(renderer_move(renderer, &scene, &settings, &messages));
-        OwnedFilm film, expected = film_render(&probe_compute, &scene, &settings, 0);
-        assert_true(renderer_render_film(renderer, 0, &film));
-        film_assert_same(&film, &expected, "near or far");
+        OwnedFilm expected = film_render(&probe_compute, &scene, &settings, 0);
+        check_render(renderer, &expected, "near or far");
         hashes[i] = renderer_report(renderer)->kernel_hash;
         build_seconds[i] = renderer_report(renderer)->build_seconds;
     }
