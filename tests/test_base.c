@@ -63,9 +63,7 @@ TEST(message_long_line)
     memset(line, 'a', 1000);
     line[1000] = '\0';
     check_message(line, 500, "a.yaml:1:501: error: bad word\n");
-    char expected[400];
-    snprintf(expected, sizeof expected, "a.yaml:1:1: error: bad word\n%.240s\n^\n", line);
-    check_message(line, 0, expected);
+    check_message(line, 0, formatted("a.yaml:1:1: error: bad word\n%.240s\n^\n", line));
 }
 
 TEST(message_without_place)

@@ -229,10 +229,9 @@ TEST(rays_may_look_behind_their_start)
             dimmed += expected[i].light > 0 && expected[i].light < 1;
         }
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
-            char what[40];
-            snprintf(what, sizeof what, "%s, %u lanes", precision_names[precisions[k]], *lanes);
             trace_lanes(&scene, precisions[k], BVH_ON, *lanes, rays, COUNT, hits);
-            different += hits_differ(rays, hits, expected, what);
+            different += hits_differ(rays, hits, expected,
+                                     formatted("%s, %u lanes", precision_names[precisions[k]], *lanes));
         }
     }
     assert_true(behind > COUNT / 32);

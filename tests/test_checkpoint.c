@@ -246,8 +246,7 @@ TEST(refusals)
 // A symbolic link stays. The file behind it is removed, and the next render creates it.
 TEST(symbolic_links)
 {
-    char file[80];
-    snprintf(file, sizeof file, "%s-file", path);
+    const char *file = formatted("%s-file", path);
     unlink(path);
     assert_int_equal(symlink(file, path), 0);
     for (int i = 0; i < 2; i++) {

@@ -67,9 +67,7 @@ TEST(commands)
             Command command = commands[i];
             failing_call = calls[k];
             ChildEnd end = child_run(command_fail, &command, sizeof command);
-            char expected[64];
-            snprintf(expected, sizeof expected, "glint: %s: CL_OUT_OF_RESOURCES (-5) on ", calls[k]);
-            assert_prints(&end, expected);
+            assert_prints(&end, formatted("glint: %s: CL_OUT_OF_RESOURCES (-5) on ", calls[k]));
             assert_int_equal(end.status, EXIT_MACHINE);
         }
 }
@@ -112,8 +110,7 @@ TEST(several_devices)
         Command command = {command_render,
                            {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", runs[i].devices,
                             "-o", runs[i].file}};
-        char expected[160];
-        snprintf(expected, sizeof expected, "%s%s", runs[i].expected, runs[i].reason);
+        const char *expected = formatted("%s%s", runs[i].expected, runs[i].reason);
         failing_call = runs[i].call;
         failing_index = runs[i].index;
         first_is_tiny = runs[i].first_is_tiny;

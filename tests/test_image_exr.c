@@ -139,11 +139,10 @@ static void check_values(const char *layer, const char *expected, const char *wh
 
 static void check_read(const char *names, const char *expected, Type type)
 {
-    char what[128];
-    snprintf(what, sizeof what, "%s, compression %d, type %d, tiled %d", names, (int)type.compression,
-             (int)type.type, type.is_tiled);
     exr_write(names, type);
-    check_values(NULL, expected, what);
+    check_values(NULL, expected,
+                 formatted("%s, compression %d, type %d, tiled %d", names, (int)type.compression,
+                           (int)type.type, type.is_tiled));
 }
 
 static void check_refused(const char *layer, const char *reason)

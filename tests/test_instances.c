@@ -38,9 +38,7 @@ static void ball_write(const char *name, bool is_smooth)
                 text_appendf(&text, format, a, a, c, c, d, d);
             }
         }
-    char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    file_write(path, text_c(&text));
+    file_write(formatted("%s/%s", folder, name), text_c(&text));
 }
 
 static int instances_open(void **state)
@@ -55,9 +53,7 @@ static int instances_close(void **state)
 {
     static const char *const names[] = {"smooth.obj", "flat.obj", ""};
     for (int i = 0; i < 3; i++) {
-        char path[256];
-        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
-        remove(path);
+        remove(formatted("%s/%s", folder, names[i]));
     }
     return probe_close(state);
 }

@@ -36,9 +36,7 @@ static Film render_alone(const Scene *scene, const RenderSettings *settings)
 
 static void same_and_freed(const Case *c, Film *film, const char *what)
 {
-    char name[96];
-    snprintf(name, sizeof name, "%s, %s", c->name, what);
-    film_assert_same(film, &c->film, name);
+    film_assert_same(film, &c->film, formatted("%s, %s", c->name, what));
     film_free(film);
 }
 
@@ -74,10 +72,8 @@ static void runs_bands_and_bvh_change_nothing(const Case *c)
     Film again = render(c->scene, &settings);
     same_and_freed(c, &again, "again");
     for (settings.band_rows = 1; settings.band_rows <= 5; settings.band_rows += 4) {
-        char what[32];
-        snprintf(what, sizeof what, "bands of %u rows", settings.band_rows);
         Film bands = render(c->scene, &settings);
-        same_and_freed(c, &bands, what);
+        same_and_freed(c, &bands, formatted("bands of %u rows", settings.band_rows));
     }
     settings = c->settings;
     settings.bvh = BVH_OFF;
@@ -91,10 +87,8 @@ static void lanes_change_nothing(const Case *c)
         RenderSettings settings = c->settings;
         settings.lanes = *lanes;
         if (settings.precision != PRECISION_SINGLE && settings.lanes > 1) break;
-        char what[32];
-        snprintf(what, sizeof what, "%u lanes", settings.lanes);
         Film film = render_alone(c->scene, &settings);
-        same_and_freed(c, &film, what);
+        same_and_freed(c, &film, formatted("%u lanes", settings.lanes));
     }
 }
 
@@ -112,9 +106,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
             for (size_t axis = 0; axis < 3; axis++)
                 film.position[3 * k + axis] = ldexp(film.position[3 * k + axis], -exponents[i]);
         }
-        char what[32];
-        snprintf(what, sizeof what, "scaled by 2^%d", exponents[i]);
-        same_and_freed(c, &film, what);
+        same_and_freed(c, &film, formatted("scaled by 2^%d", exponents[i]));
     }
 }
 
@@ -192,8 +184,7 @@ static void precision_holds(void **state)
     if (!probe_has(precision) || precision < probe_same_bits_from()) skip();
     for (uint64_t seed = 1; seed <= (tests_are_long() ? SEEDS : 2); seed++) {
         OwnedScene scene = optical_scene(seed);
-        char name[48];
-        snprintf(name, sizeof name, "%s, seed %u", precision_names[precision], (unsigned)seed);
+        OWNED char *name = text_format("%s, seed %u", precision_names[precision], (unsigned)seed);
         Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
         c.settings.bvh = BVH_ON;
         c.settings.extra_features |= features_of(&scene); // also where a changed scene needs fewer
@@ -245,8 +236,7 @@ TEST(culls_of_several_packets_change_nothing)
         c.settings.extra_features = settings.extra_features;
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             if (*lanes == 1) continue;
-            char what[48];
-            snprintf(what, sizeof what, "%zu objects, %u lanes", counts[i], *lanes);
+            const char *what = formatted("%zu objects, %u lanes", counts[i], *lanes);
             c.settings.lanes = *lanes;
             Film film = render_alone(&scene, &c.settings);
             same_and_freed(&c, &film, what);

@@ -85,9 +85,7 @@ TEST(arguments_are_counted)
 
 static size_t file_check(const char *file)
 {
-    char text[64];
-    snprintf(text, sizeof text, "#include \"%s\"\n", file);
-    cl_program program = program_with_arguments(text);
+    cl_program program = program_with_arguments(formatted("#include \"%s\"\n", file));
     cl_kernel kernels[8];
     cl_uint count = 0;
     compute_try(&probe_compute, clCreateKernelsInProgram(program, 8, kernels, &count));

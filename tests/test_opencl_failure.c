@@ -153,9 +153,8 @@ TEST(discovery)
             assert_int_equal(messages.count, chosen == NULL);
             if (injected.call) assert_string_equal(list.failed_call, queries[i]);
             if (messages.count > 0) {
-                char failure[64];
-                snprintf(failure, sizeof failure, "(%s: CL_OUT_OF_RESOURCES (-5))", queries[i]);
-                assert_non_null(strstr(messages.items[0].text, failure));
+                assert_non_null(
+                    strstr(messages.items[0].text, formatted("(%s: CL_OUT_OF_RESOURCES (-5))", queries[i])));
             }
             device_list_close(&list);
             if (!injected.call) {

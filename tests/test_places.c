@@ -95,9 +95,7 @@ TEST(descriptions)
     const size_t triangles = scene.meshes.items[0].triangle_count;
     assert_described(&scene, 0, "sphere 0, a.yaml:5, material red");
     assert_described(&scene, 3, "triangle 2 of mesh 1, bunny.obj, a.yaml:6");
-    char plane[40];
-    snprintf(plane, sizeof plane, "plane %zu, a.yaml:7", triangles + 1);
-    assert_described(&scene, triangles + 1, plane);
+    assert_described(&scene, triangles + 1, formatted("plane %zu, a.yaml:7", triangles + 1));
     assert_described(&scene, triangles + 2, "nothing");
     assert_described(&scene, UINT32_MAX, "nothing");
 }

@@ -118,9 +118,7 @@ static void check_scene(BrokenScene *broken)
 static void check_table(void **state)
 {
     const char *ending = *state;
-    char path[32];
-    snprintf(path, sizeof path, "tests/broken/%s.txt", ending);
-    OwnedText table = file_text(path);
+    OwnedText table = file_text(formatted("tests/broken/%s.txt", ending));
     size_t count = 0;
     char *line = strstr(table.items, "#### scene ");
     OwnedText start = {0};

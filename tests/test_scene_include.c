@@ -251,8 +251,7 @@ TEST(number_of_included_files_is_limited)
 {
     OwnedText list = {0};
     for (int i = 0; i < 100; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "%d.yaml", i);
+        const char *name = formatted("%d.yaml", i);
         file_write(name, "objects: []\n");
         text_appendf(&list, "%s, ", name);
     }
@@ -268,21 +267,18 @@ TEST(number_of_included_files_is_limited)
     text_free(&scene);
     text_appendf(&scene, "include: [%s last.yaml, lost.yaml]\n" CAMERA, text_c(&list));
     file_write("scene.yaml", text_c(&scene));
-    char expected[80];
-    snprintf(expected, sizeof expected, "scene.yaml:1:%zu: error: more than 100 included files\n",
-             strlen("include: [") + list.count + 2);
-    check_messages("scene.yaml", NULL, 0, expected);
+    check_messages("scene.yaml", NULL, 0,
+                   formatted("scene.yaml:1:%zu: error: more than 100 included files\n",
+                             strlen("include: [") + list.count + 2));
     text_free(&scene);
     // a file that cannot be read counts
     assert_int_equal(symlink("/proc/self/mem", "unreadable.yaml"), 0);
     text_appendf(&scene, "include: [unreadable.yaml, %slost.yaml]\n" CAMERA, text_c(&list));
     file_write("scene.yaml", text_c(&scene));
-    char both[160];
-    snprintf(both, sizeof both,
-             "scene.yaml:1:11: error: cannot read 'unreadable.yaml': Input/output error\n"
-             "scene.yaml:1:%zu: error: more than 100 included files\n",
-             strlen("include: [unreadable.yaml, ") + list.count + 1 - strlen("99.yaml, "));
-    check_messages("scene.yaml", NULL, 0, both);
+    check_messages("scene.yaml", NULL, 0,
+                   formatted("scene.yaml:1:11: error: cannot read 'unreadable.yaml': Input/output error\n"
+                             "scene.yaml:1:%zu: error: more than 100 included files\n",
+                             strlen("include: [unreadable.yaml, ") + list.count + 1 - strlen("99.yaml, ")));
     text_free(&scene);
 }
 

@@ -108,9 +108,7 @@ static const Pair pairs[] = {
 
 static Scene scene_with(const char *objects)
 {
-    char text[2048];
-    snprintf(text, sizeof text, "%s%sobjects: %s\n", SCENE, DEFINITIONS, objects);
-    return scene_of_text("a.yaml", text);
+    return scene_of_text("a.yaml", formatted("%s%sobjects: %s\n", SCENE, DEFINITIONS, objects));
 }
 
 TEST(transformed_objects_are_hit_where_plain_ones_are)

@@ -292,10 +292,9 @@ TEST(between_levels_it_blends)
     // 0.25 a texel; 2 distance tan(fov / 2) = 0.75. The eye looks at the middle of a texel of 2 columns,
     // which is the second of the four: black, its neighbors of half the texture's width: the colors 1 and 0.
     double finer = 0, coarser = 0.5 * (1 - 0.25); // of 4 columns: white in half of the first
-    char camera[128];
-    snprintf(camera, sizeof camera, "position: [0.75, 0.75, 1], look_at: [0.75, 0.75, 0], fov: %.17g",
-             2 * atan(0.375) * 180 / M_PI);
-    check_seen(camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
+    check_seen(formatted("position: [0.75, 0.75, 1], look_at: [0.75, 0.75, 0], fov: %.17g",
+                         2 * atan(0.375) * 180 / M_PI),
+               "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
 }
 
 // A mirror's texture of a texture is filtered for the whole path to the eye.
