@@ -166,8 +166,9 @@ def has_device(**options):
 
 
 class TestCase(unittest.TestCase):
-    """Each test runs in a new, empty folder."""
+    """Each test runs in a new folder with these files."""
 
+    files = {}
     maxDiff = 4000
 
     def setUp(self):
@@ -175,6 +176,8 @@ class TestCase(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.addCleanup(os.chdir, ROOT)
         os.chdir(folder.name)
+        for name, text in self.files.items():
+            write(name, text)
 
     def skip_if_refused(self, reason):
         """Skips the test if the reason is that the default device's arithmetic does not have a precision."""

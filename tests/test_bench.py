@@ -50,9 +50,7 @@ int nvmlDeviceGetTotalEnergyConsumption(void *board, unsigned long long *total)
 
 
 class Bench(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("sphere.yaml", SPHERE)
+    files = {"sphere.yaml": SPHERE}
 
     def assertFigure(self, value):
         """Checks that a figure is a number above 0, or states why there is none."""

@@ -94,13 +94,7 @@ def alternatives(command):
 
 
 class CliTestCase(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("sphere.yaml", SPHERE)
-        write("notes", "not a scene\n")
-        write("s.rt", "")
-        os.makedirs("folder", exist_ok=True)
-        write("rays", "0 0 -4  0 0 1\n")
+    files = {"sphere.yaml": SPHERE, "notes": "not a scene\n", "s.rt": "", "rays": "0 0 -4  0 0 1\n"}
 
     def nothing_left(self, pattern):
         self.assertEqual(glob.glob(pattern) + glob.glob(f".{pattern}"), [])
@@ -115,6 +109,7 @@ class Commands(CliTestCase):
             self.assertRegex(self.glint(f"{command} --help").stdout, f"(?m)^usage: glint {command}")
 
     def test_wrong_command_lines(self):
+        os.mkdir("folder")
         for pattern, commands in WRONG_COMMAND_LINES:
             for command in alternatives(commands):
                 with self.subTest(command):

@@ -73,11 +73,8 @@ def large_mesh(path, side=320):
 
 
 class DeviceLimits(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("sphere.yaml", SPHERE)
-        write("large.yaml", SPHERE + "  - mesh: {file: large.obj}\n")
-        write("rays.txt", "".join(f"0 0 -4  {i / 40000 - 0.5} {i % 200 / 200 - 0.5} 1\n" for i in range(40000)))
+    files = {"sphere.yaml": SPHERE, "large.yaml": SPHERE + "  - mesh: {file: large.obj}\n",
+             "rays.txt": "".join(f"0 0 -4  {i / 40000 - 0.5} {i % 200 / 200 - 0.5} 1\n" for i in range(40000))}
 
     def outputs(self, command, limits=None):
         """Returns the command's standard output and files, on the device with the limits."""

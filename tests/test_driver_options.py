@@ -5,16 +5,14 @@ run_tests: sanitize-long-only"""
 import os
 import unittest
 
-from glint import IS_LONG, SPHERE, TestCase, main, need_device, write
+from glint import IS_LONG, SPHERE, TestCase, main, need_device
 
 PRECISIONS = (["strict"] if IS_LONG else []) + ["certified" if need_device()["fp64"] else "single"]
 SMALL = "scene.yaml --size 50x35 --samples 2"
 
 
 class DriverOptions(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("scene.yaml", SPHERE)
+    files = {"scene.yaml": SPHERE}
 
     def launches(self, command):
         return [launch for device in self.json(f"{command} --timing=json")["by_device"] for launch in device["launches"]]

@@ -55,9 +55,7 @@ def text(value):
 class Formats(TestCase):
     reports = {}  # in JSON, by command
 
-    def setUp(self):
-        super().setUp()
-        write("s.yaml", SPHERE)
+    files = {"s.yaml": SPHERE}
 
     def rows(self, command, path):
         """Returns the rows of the report in JSON, by one run for all formats, since a bench builds its kernels on every run."""

@@ -31,9 +31,7 @@ void *clEnqueueMapBuffer(void *queue, void *buffer, unsigned blocking, unsigned 
 
 
 class Golden(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("s.yaml", SPHERE)
+    files = {"s.yaml": SPHERE}
 
     def written(self):
         self.glint("golden write s.yaml --size 24x18")

@@ -85,10 +85,7 @@ def in_order(paths):
 
 
 class Json(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("plain.yaml", PLAIN)
-        write("strong.yaml", STRONG)
+    files = {"plain.yaml": PLAIN, "strong.yaml": STRONG}
 
     def check_members(self, heading, *reports):
         """Checks that the reports together print the members of the page's section, each of its type."""

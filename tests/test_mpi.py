@@ -103,9 +103,7 @@ def environment():
 
 
 class Mpi(TestCase):
-    def setUp(self):
-        super().setUp()
-        write("sphere.yaml", SPHERE)
+    files = {"sphere.yaml": SPHERE}
 
     def mpirun(self, arguments, status=0):
         process = subprocess.run(["mpirun", *shlex.split(arguments)], env=environment(), stdin=subprocess.DEVNULL,
