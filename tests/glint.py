@@ -211,6 +211,10 @@ class TestCase(unittest.TestCase):
         if Path(path).read_bytes() != Path(other).read_bytes():
             self.fail(f"{path} and {other} differ")
 
+    def nothing_left(self, pattern):
+        """Checks that no file of the folder fits the pattern, nor one with a dot before it."""
+        self.assertEqual([*Path().glob(pattern), *Path().glob(f".{pattern}")], [])
+
 
 def write(path, text):
     Path(path).write_text(text, encoding="utf-8")
