@@ -87,8 +87,8 @@ static Vector3 delicate_point(const Scene *scene)
         const Vector3 *vertices = object->as.triangle.vertices;
         return vector_add(vertices[0], vector_scale(vector_subtract(vertices[1], vertices[0]), part));
     }
-    Bounds box;
-    if (!shape_ops[object->type]->bounds(scene, object, &box)) return random_cube_point(&random_state, 10);
+    const Bounds box = object_bounds(scene, object);
+    if (bounds_is_everywhere(&box)) return random_cube_point(&random_state, 10);
     if (random_coin(&random_state)) return (Vector3){box.max.x, box.min.y, box.max.z};
     Vector3 center = vector_scale(vector_add(box.min, box.max), 0.5);
     return (Vector3){box.max.x, center.y, center.z};

@@ -75,8 +75,7 @@ TEST(a_cylinder_is_seen_from_its_nearest_point)
         assert_number(cylinder->base_radius.z, 0);
         assert_number(cylinder->range.w / length, -1234567.8);
         assert_number(cylinder->range.x / length, 7654321.1);
-        Bounds bounds;
-        assert_true(primitive_bounds(TYPE_CYLINDERS, cylinder, &bounds));
+        const Bounds bounds = primitive_bounds(TYPE_CYLINDERS, cylinder);
         assert_true(fabs(bounds.min.z + 1234567.8) < 1 && fabs(bounds.max.z - 7654321.1) < 1);
     }
 }

@@ -29,15 +29,14 @@ typedef struct {
 typedef struct {
     const FlatArray *array;
     size_t type;
-    Bounds *boxes; // of the array's primitives; empty if unbounded
+    Bounds *boxes; // of the array's primitives
 } Boxing;
 
 static void range_box(void *context, size_t begin, size_t end)
 {
     const Boxing *boxing = context;
     for (size_t i = begin; i < end; i++)
-        if (!primitive_bounds(boxing->type, flat_array_at(boxing->array, i), &boxing->boxes[i]))
-            boxing->boxes[i] = bounds_empty();
+        boxing->boxes[i] = primitive_bounds(boxing->type, flat_array_at(boxing->array, i));
 }
 
 static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
@@ -55,7 +54,7 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
         Boxing boxing = {array, type, bounded->boxes + bounded->count};
         parallel_run(array->count, FLAT_RANGE_MIN, range_box, &boxing);
         for (size_t i = 0; i < array->count; i++) {
-            if (bounds_is_empty(&boxing.boxes[i])) continue;
+            if (bounds_is_everywhere(&boxing.boxes[i])) continue;
             bounded->boxes[bounded->count] = boxing.boxes[i];
             bounded->types[bounded->count] = (uint8_t)type;
             bounded->places[bounded->count++] = (uint32_t)i;

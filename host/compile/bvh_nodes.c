@@ -98,10 +98,10 @@ static void leaves_fit(void *context, size_t begin, size_t end)
             const unsigned type = leaf_type(node.child_type[k]), count = leaf_count(node.child_type[k]);
             if (count == 0) continue;
             const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
-            Bounds all = bounds_empty(), box;
+            Bounds all = bounds_empty();
             const size_t first = leaf_first(compiled, &node, k);
             for (size_t p = first; p < first + count; p++)
-                if (primitive_bounds(type, flat_array_at(array, p), &box)) all = bounds_join(all, box);
+                all = bounds_join(all, primitive_bounds(type, flat_array_at(array, p)));
             child_box_write(&node, k, &all);
         }
     }

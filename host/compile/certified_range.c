@@ -24,14 +24,6 @@ typedef struct {
     atomic_bool exceeds;
 } RangeTest;
 
-static double primitive_reach(size_t type, const void *primitive)
-{
-    Bounds bounds;
-    if (primitive_bounds(type, primitive, &bounds))
-        return fmax(vector_largest(bounds.min), vector_largest(bounds.max));
-    return shape_ops[type]->largest_coordinate(primitive);
-}
-
 // Returns whether an oval is in range in the unit shape's space, where distances are up to twice the
 // inverse's norm times as large, and not smaller.
 static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)

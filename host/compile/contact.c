@@ -31,24 +31,11 @@ typedef struct {
     size_t count;
 } ContactRegionList;
 
-static bool region_is_bounded(const ContactRegion *region)
-{
-    return isfinite(region->box.min.x);
-}
-
-static Bounds everywhere(void)
-{
-    return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
-}
-
 static ContactRegion region_of(size_t type, const void *primitive)
 {
     const ShapeOps *shape = shape_ops[type];
-    ContactRegion region = {.box = everywhere()};
-    if (primitive_bounds(type, primitive, &region.box))
-        region.largest_coordinate = fmax(vector_largest(region.box.min), vector_largest(region.box.max));
-    else
-        region.largest_coordinate = shape->largest_coordinate(primitive);
+    ContactRegion region = {.box = primitive_bounds(type, primitive)};
+    region.largest_coordinate = primitive_reach(type, primitive);
     if (shape->plane) {
         Vector3 point;
         shape->plane(primitive, &point, &region.normal);
@@ -92,7 +79,7 @@ static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double ma
 // error grows with the distance.
 static Bounds regions_overlap(const ContactRegion *a, const ContactRegion *b, double margin)
 {
-    if (!region_is_bounded(a) && !region_is_bounded(b)) return everywhere();
+    if (bounds_is_everywhere(&a->box) && bounds_is_everywhere(&b->box)) return bounds_everywhere();
     Bounds both = bounds_intersect(bounds_grow(a->box, margin), b->box);
     if (bounds_is_empty(&both)) return both;
     both = bounds_grow(both, margin);
@@ -141,10 +128,10 @@ static void regions_join_bounded(ContactRegionList *list)
     Bounds all = bounds_empty();
     size_t count = 0;
     for (size_t i = 0; i < list->count; i++) {
-        if (region_is_bounded(&list->items[i]))
-            all = bounds_join(all, list->items[i].box);
-        else
+        if (bounds_is_everywhere(&list->items[i].box))
             list->items[count++] = list->items[i];
+        else
+            all = bounds_join(all, list->items[i].box);
     }
     if (!bounds_is_empty(&all)) list->items[count++] = (ContactRegion){.box = all};
     list->count = count;
@@ -171,7 +158,7 @@ static Bounds lists_overlap(ContactRegionList *transparent, ContactRegionList *o
     regions_keep_near(transparent, opaque, margin);
     if (transparent->count == 0) return bounds_empty();
     if (opaque->count > PAIRS_MAX / transparent->count) regions_join_bounded(opaque);
-    if (opaque->count > PAIRS_MAX / transparent->count) return everywhere();
+    if (opaque->count > PAIRS_MAX / transparent->count) return bounds_everywhere();
     Bounds all = bounds_empty();
     for (size_t i = 0; i < transparent->count; i++)
         for (size_t k = 0; k < opaque->count; k++)

@@ -69,8 +69,8 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
     Extreme farthest = {NULL, 0}, smallest = {NULL, INFINITY};
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        Bounds bounds;
-        if (!shape_ops[object->type]->bounds(scene, object, &bounds)) continue;
+        const Bounds bounds = object_bounds(scene, object);
+        if (bounds_is_everywhere(&bounds)) continue;
         const double reach = fmax(vector_largest(vector_subtract(bounds.min, eye)),
                                   vector_largest(vector_subtract(bounds.max, eye)));
         const double width = box_width(&bounds);

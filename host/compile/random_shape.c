@@ -66,9 +66,9 @@ size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX])
             if (count == SHAPE_FORMS_MAX) fault("more than %d forms of shapes", SHAPE_FORMS_MAX);
             ShapeForm *entry = &forms[count++];
             *entry = (ShapeForm){type, form, shape->forms[form], false};
-            Bounds bounds;
-            RandomShape one = random_shape(entry, &(Random){0});
-            entry->bounded = shape->bounds(NULL, &one.object, &bounds);
+            const RandomShape one = random_shape(entry, &(Random){0});
+            const Bounds bounds = object_bounds(NULL, &one.object);
+            entry->bounded = !bounds_is_everywhere(&bounds);
         }
     }
     return count;

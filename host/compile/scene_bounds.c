@@ -4,14 +4,14 @@
 
 Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)
 {
-    Bounds all = bounds_empty(), bounds;
+    Bounds all = bounds_empty();
     *unbounded_count = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        if (shape_ops[object->type]->bounds(scene, object, &bounds))
-            all = bounds_join(all, bounds);
-        else
+        const Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
+        if (bounds_is_everywhere(&bounds))
             ++*unbounded_count;
+        else
+            all = bounds_join(all, bounds);
     }
     return all;
 }
@@ -19,10 +19,8 @@ Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)
 double scene_smallest_size(const Scene *scene)
 {
     double smallest = INFINITY;
-    Bounds bounds;
     for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        if (!shape_ops[object->type]->bounds(scene, object, &bounds)) continue;
+        const Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
         double largest_side = vector_largest(vector_subtract(bounds.max, bounds.min));
         if (largest_side > 0) smallest = fmin(smallest, largest_side);
     }

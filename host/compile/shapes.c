@@ -1,4 +1,5 @@
 #include "host/compile/shapes.h"
+#include "host/scene/mesh.h"
 #include <float.h>
 
 #define SHAPE_DECLARE(feature, Type, name, names) extern const ShapeOps name##_ops;
@@ -10,9 +11,18 @@ const ShapeOps *const shape_ops[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)[SHAPE_MESH
 _Static_assert((int)SHAPE_MESH == (int)TYPE_INSTANCES && TYPE_INSTANCES + 1 == TYPE_COUNT,
                "ShapeKind follows PRIMITIVE_LIST: a mesh, which is last, may be an instance");
 
-bool primitive_bounds(size_t type, const void *primitive, Bounds *bounds)
+Bounds object_bounds(const Scene *scene, const Object *object)
 {
-    return shape_ops[type]->primitive_bounds && shape_ops[type]->primitive_bounds(primitive, bounds);
+    if (object->type == SHAPE_MESH)
+        return mesh_object_bounds(&scene->meshes.items[object->as.mesh.index], object);
+    const ShapeOps *shape = shape_ops[object->type];
+    return shape->bounds ? shape->bounds(object) : bounds_everywhere();
+}
+
+Bounds primitive_bounds(size_t type, const void *primitive)
+{
+    const ShapeOps *shape = shape_ops[type];
+    return shape->primitive_bounds ? shape->primitive_bounds(primitive) : bounds_everywhere();
 }
 
 BoundingSphere box_bounding_sphere(const Bounds *box)
@@ -25,7 +35,13 @@ BoundingSphere box_bounding_sphere(const Bounds *box)
 BoundingSphere primitive_bounding_sphere(size_t type, const void *primitive)
 {
     if (shape_ops[type]->bounding_sphere) return shape_ops[type]->bounding_sphere(primitive);
-    Bounds box;
-    if (!primitive_bounds(type, primitive, &box)) return (BoundingSphere){.radius = INFINITY};
-    return box_bounding_sphere(&box);
+    const Bounds box = primitive_bounds(type, primitive);
+    return bounds_is_everywhere(&box) ? (BoundingSphere){.radius = INFINITY} : box_bounding_sphere(&box);
+}
+
+double primitive_reach(size_t type, const void *primitive)
+{
+    const Bounds box = primitive_bounds(type, primitive);
+    return bounds_is_everywhere(&box) ? shape_ops[type]->largest_coordinate(primitive)
+                                      : fmax(vector_largest(box.min), vector_largest(box.max));
 }

@@ -20,8 +20,8 @@ typedef struct {
     size_t vectors[7], lengths[3];
     // Restores what transforms of its vectors break, or NULL.
     void (*restore)(Object *object);
-    // Sets *bounds. Returns false, with *bounds unchanged, if the object is unbounded.
-    bool (*bounds)(const Scene *scene, const Object *object, Bounds *bounds);
+    // Returns the bounds of an object other than a mesh. NULL means always unbounded.
+    Bounds (*bounds)(const Object *object);
     // Adds the primitive that flattening->part selects (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
 
@@ -31,8 +31,8 @@ typedef struct {
     // made->axis if it has an axis or normal. Updates the radius and the axis if it chooses others.
     void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
-    // Sets the bounds of a primitive. Returns false if it is unbounded. NULL means always unbounded.
-    bool (*primitive_bounds)(const void *primitive, Bounds *bounds);
+    // Returns the bounds of a primitive. NULL means always unbounded.
+    Bounds (*primitive_bounds)(const void *primitive);
     // Returns the bounding sphere. NULL means that of primitive_bounds.
     BoundingSphere (*bounding_sphere)(const void *primitive);
     // Sets a point and a normal of any length of a flat primitive. NULL means not flat.
@@ -44,9 +44,13 @@ typedef struct {
 // Indexed by ShapeType, whose values except SHAPE_MESH are those of TYPE_….
 extern const ShapeOps *const shape_ops[SHAPE_COUNT];
 
-// Sets the bounds of a primitive. Returns false if it is unbounded.
-bool primitive_bounds(size_t type, const void *primitive, Bounds *bounds);
+// Return the bounds of an object and of a primitive, bounds_everywhere() if it is unbounded.
+Bounds object_bounds(const Scene *scene, const Object *object);
+Bounds primitive_bounds(size_t type, const void *primitive);
 BoundingSphere primitive_bounding_sphere(size_t type, const void *primitive);
+
+// Returns the largest magnitude of a primitive's coordinates.
+double primitive_reach(size_t type, const void *primitive);
 
 // Returns the sphere around a box, enlarged by a bound on roundings here and in the box far from the eye.
 BoundingSphere box_bounding_sphere(const Bounds *box);

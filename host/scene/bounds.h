@@ -12,6 +12,17 @@ static inline Bounds bounds_empty(void)
     return (Bounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 }
 
+// Returns the bounds of what is unbounded.
+static inline Bounds bounds_everywhere(void)
+{
+    return (Bounds){{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+}
+
+static inline bool bounds_is_everywhere(const Bounds *box)
+{
+    return box->min.x == -INFINITY;
+}
+
 static inline bool bounds_is_empty(const Bounds *bounds)
 {
     return bounds->min.x > bounds->max.x;

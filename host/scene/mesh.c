@@ -201,8 +201,9 @@ Bounds mesh_vertex_bounds(const Mesh *mesh)
     return bounds;
 }
 
-Bounds instance_bounds(const Mesh *mesh, const Object *object)
+Bounds mesh_object_bounds(const Mesh *mesh, const Object *object)
 {
+    if (!object->as.mesh.is_instance) return mesh_vertex_bounds(mesh);
     Bounds all = bounds_empty();
     for (unsigned i = 0; i < 8 && mesh->vertex_count > 0; i++) {
         const Vector3 corner = affine_point(&object->as.mesh.transform, bounds_corner(mesh->bounds, i));

@@ -22,8 +22,8 @@ MeshTriangle mesh_triangle_at(const Mesh *mesh, const Object *object, size_t par
 const uint32_t *mesh_materials(const Mesh *mesh, const Object *object);
 // Returns the bounds of the vertices.
 Bounds mesh_vertex_bounds(const Mesh *mesh);
-// Returns a box around the instance, which encloses the transformed box of its mesh.
-Bounds instance_bounds(const Mesh *mesh, const Object *object);
+// Returns a box around the object. For an instance it encloses the transformed box of the mesh.
+Bounds mesh_object_bounds(const Mesh *mesh, const Object *object);
 
 // Returns how many triangles have no area.
 size_t mesh_degenerate_count(const Mesh *mesh);

@@ -41,7 +41,7 @@ static bool triangle_transform(Object *object, const Affine *affine)
 static bool instance_transform(const Mesh *mesh, Object *object, const Affine *affine)
 {
     object->as.mesh.transform = affine_multiply(affine, &object->as.mesh.transform);
-    const Bounds bounds = instance_bounds(mesh, object);
+    const Bounds bounds = mesh_object_bounds(mesh, object);
     return vector_is_within(bounds.min, NUMBER_LARGEST) && vector_is_within(bounds.max, NUMBER_LARGEST);
 }
 

@@ -40,9 +40,9 @@ ReferenceScene reference_scene_open(const Scene *scene)
     made.scene.objects.items = objects;
     made.scene.objects.count = made.scene.objects.capacity = count;
     for (size_t i = 0; i < count; i++) {
-        Bounds bounds;
+        const Bounds bounds = object_bounds(&made.scene, &objects[i]);
         made.spheres[i].radius = INFINITY;
-        if (!shape_ops[objects[i].type]->bounds(&made.scene, &objects[i], &bounds)) continue;
+        if (bounds_is_everywhere(&bounds)) continue;
         made.spheres[i].center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
         made.spheres[i].radius = vector_length(vector_subtract(bounds.max, made.spheres[i].center));
     }

@@ -1,10 +1,8 @@
 #include "host/compile/shapes.h"
 
-static bool box_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds box_bounds(const Object *object)
 {
-    (void)scene;
-    *bounds = (Bounds){object->as.box.min, object->as.box.max};
-    return true;
+    return (Bounds){object->as.box.min, object->as.box.max};
 }
 
 static void box_restore(Object *object)
@@ -21,11 +19,10 @@ static void box_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_BOXES, &box, object->material);
 }
 
-static bool box_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds box_primitive_bounds(const void *primitive)
 {
     const Box *box = primitive;
-    *bounds = (Bounds){vector3_of(&box->low), vector3_of(&box->high)};
-    return true;
+    return (Bounds){vector3_of(&box->low), vector3_of(&box->high)};
 }
 
 static void box_randomize(RandomShape *made, unsigned form, Random *random)

@@ -1,11 +1,9 @@
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
 
-static bool disc_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds disc_bounds(const Object *object)
 {
-    (void)scene;
-    *bounds = bounds_of_disc(object->as.disc.center, object->as.disc.normal, object->as.disc.radius);
-    return true;
+    return bounds_of_disc(object->as.disc.center, object->as.disc.normal, object->as.disc.radius);
 }
 
 // Sets the eye's power if the center's rounding would move the disc, or its rim, by more than 4 roundings of
@@ -47,12 +45,12 @@ static BoundingSphere disc_bounding_sphere(const void *primitive)
     return (BoundingSphere){vector3_of(&disc->center_radius), disc->center_radius.w};
 }
 
-// Sets the bounding sphere's bounds, because t is uncertain by as much for rays nearly in the disc's plane.
-static bool disc_primitive_bounds(const void *primitive, Bounds *bounds)
+// Returns the bounding sphere's bounds, because t is uncertain by as much for rays nearly in the disc's
+// plane.
+static Bounds disc_primitive_bounds(const void *primitive)
 {
     const Disc *disc = primitive;
-    *bounds = bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
-    return true;
+    return bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
 }
 
 static void disc_plane(const void *primitive, Vector3 *point, Vector3 *normal)

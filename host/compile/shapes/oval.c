@@ -20,12 +20,10 @@ static Vector3 oval_half_extents(const Object *object)
     return (Vector3){half[0], half[1], half[2]};
 }
 
-static bool oval_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds oval_bounds(const Object *object)
 {
-    (void)scene;
-    if (!oval_is_bounded(object)) return false;
-    *bounds = bounds_around(object->as.oval.center, oval_half_extents(object));
-    return true;
+    if (!oval_is_bounded(object)) return bounds_everywhere();
+    return bounds_around(object->as.oval.center, oval_half_extents(object));
 }
 
 static void oval_flatten(Flattening *flattening, const Object *object)
@@ -77,13 +75,12 @@ static void oval_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_OVALS, &oval, object->material);
 }
 
-static bool oval_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds oval_primitive_bounds(const void *primitive)
 {
     const Oval *oval = primitive;
     const Vector3 half = vector3_of(&oval->extent);
-    if (vector_is_zero(half)) return false;
-    *bounds = bounds_around((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}, half);
-    return true;
+    if (vector_is_zero(half)) return bounds_everywhere();
+    return bounds_around((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}, half);
 }
 
 static double oval_largest_coordinate(const void *primitive)

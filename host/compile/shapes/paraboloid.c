@@ -98,24 +98,21 @@ static Bounds paraboloid_bounds_of(Vector3 apex, Vector3 axis, double focal_leng
     return (Bounds){vector_subtract(apex, below), vector_add(apex, above)};
 }
 
-static bool paraboloid_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds paraboloid_bounds(const Object *object)
 {
-    (void)scene;
-    if (!object->as.paraboloid.finite) return false;
-    *bounds = paraboloid_bounds_of(object->as.paraboloid.apex, object->as.paraboloid.axis,
-                                   object->as.paraboloid.focal_length, object->as.paraboloid.height);
-    return true;
+    if (!object->as.paraboloid.finite) return bounds_everywhere();
+    return paraboloid_bounds_of(object->as.paraboloid.apex, object->as.paraboloid.axis,
+                                object->as.paraboloid.focal_length, object->as.paraboloid.height);
 }
 
-static bool paraboloid_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds paraboloid_primitive_bounds(const void *primitive)
 {
     const Paraboloid *shape = primitive;
     const Vector3 axis = vector3_of(&shape->axis_end);
     const double length = vector_length(axis);
-    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
-    *bounds = paraboloid_bounds_of(vector3_of(&shape->apex_k), axis, shape->apex_k.w / (4 * length),
-                                   (shape->axis_end.w + shape->foot_lift.w) / length);
-    return true;
+    if (!(shape->id.y & REVOLUTION_FINITE)) return bounds_everywhere();
+    return paraboloid_bounds_of(vector3_of(&shape->apex_k), axis, shape->apex_k.w / (4 * length),
+                                (shape->axis_end.w + shape->foot_lift.w) / length);
 }
 
 static double paraboloid_largest_coordinate(const void *primitive)

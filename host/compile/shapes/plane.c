@@ -1,12 +1,6 @@
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
 
-static bool plane_bounds(const Scene *scene, const Object *object, Bounds *bounds)
-{
-    (void)scene, (void)object, (void)bounds;
-    return false;
-}
-
 static void plane_flatten(Flattening *flattening, const Object *object)
 {
     const Vector3 normal = object->as.plane.normal;
@@ -40,7 +34,6 @@ static void plane_randomize(RandomShape *made, unsigned form, Random *random)
 const ShapeOps plane_ops = {
     .type = TYPE_PLANES,
     .vectors = {offsetof(Object, as.plane.point), offsetof(Object, as.plane.normal)},
-    .bounds = plane_bounds,
     .flatten = plane_flatten,
     .forms = {"plane"},
     .randomize = plane_randomize,

@@ -185,39 +185,35 @@ static Bounds frustum_bounds(Vector3 from, Vector3 axis, double radius_from, dou
                        bounds_of_disc(vector_add(from, axis), axis, radius_to));
 }
 
-static bool cylinder_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds cylinder_bounds(const Object *object)
 {
-    (void)scene;
     const double radius = object->as.cylinder.radius;
-    if (!object->as.cylinder.finite) return false;
-    *bounds = frustum_bounds(object->as.cylinder.from, object->as.cylinder.axis, radius, radius);
-    return true;
+    if (!object->as.cylinder.finite) return bounds_everywhere();
+    return frustum_bounds(object->as.cylinder.from, object->as.cylinder.axis, radius, radius);
 }
 
-static bool cone_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds cone_bounds(const Object *object)
 {
-    (void)scene;
     const double *radius = object->as.cone.radius;
-    if (!object->as.cone.finite) return false;
-    *bounds = frustum_bounds(object->as.cone.from, object->as.cone.axis, radius[0], radius[1]);
-    return true;
+    if (!object->as.cone.finite) return bounds_everywhere();
+    return frustum_bounds(object->as.cone.from, object->as.cone.axis, radius[0], radius[1]);
 }
 
-static bool revolution_bounds(const void *primitive, Bounds *bounds)
+static Bounds revolution_bounds(const void *primitive)
 {
     const Revolution *shape = primitive;
-    if (!(shape->id.y & REVOLUTION_FINITE)) return false;
+    if (!(shape->id.y & REVOLUTION_FINITE)) return bounds_everywhere();
     Vector3 base = vector3_of(&shape->base_radius), axis = vector3_of(&shape->axis_slope);
     double length = shape->range.y, radius = shape->base_radius.w / length;
     const double heights[] = {shape->range.w / shape->range.z, shape->range.x / shape->range.z}; // in axes
     Vector3 half_extents = circle_half_extents(vector_scale(axis, 1 / length));
-    *bounds = bounds_empty();
+    Bounds bounds = bounds_empty();
     for (int end = 0; end < 2; end++) {
         const double end_radius = radius + shape->axis_slope.w * heights[end] * length;
-        *bounds = bounds_join(*bounds, bounds_around(vector_add(base, vector_scale(axis, heights[end])),
-                                                     vector_scale(half_extents, fabs(end_radius))));
+        bounds = bounds_join(bounds, bounds_around(vector_add(base, vector_scale(axis, heights[end])),
+                                                   vector_scale(half_extents, fabs(end_radius))));
     }
-    return true;
+    return bounds;
 }
 
 static double revolution_largest_coordinate(const void *primitive)

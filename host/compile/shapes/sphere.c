@@ -1,10 +1,8 @@
 #include "host/compile/shapes.h"
 
-static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds sphere_bounds(const Object *object)
 {
-    (void)scene;
-    *bounds = bounds_around(object->as.sphere.center, vector_all(object->as.sphere.radius));
-    return true;
+    return bounds_around(object->as.sphere.center, vector_all(object->as.sphere.radius));
 }
 
 // The eye's power |center - eye|^2 - radius^2 in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
@@ -60,11 +58,10 @@ static BoundingSphere sphere_bounding_sphere(const void *primitive)
     return (BoundingSphere){vector3_of(&sphere->center_radius), sphere->center_radius.w};
 }
 
-static bool sphere_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds sphere_primitive_bounds(const void *primitive)
 {
     const Sphere *sphere = primitive;
-    *bounds = bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
-    return true;
+    return bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
 }
 
 static void sphere_randomize(RandomShape *made, unsigned form, Random *random)

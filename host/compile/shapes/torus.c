@@ -1,12 +1,9 @@
 #include "host/compile/shapes.h"
 
-static bool torus_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds torus_bounds(const Object *object)
 {
-    (void)scene;
-    *bounds =
-        bounds_grow(bounds_of_disc(object->as.torus.center, object->as.torus.axis, object->as.torus.major),
-                    object->as.torus.minor);
-    return true;
+    return bounds_grow(bounds_of_disc(object->as.torus.center, object->as.torus.axis, object->as.torus.major),
+                       object->as.torus.minor);
 }
 
 // A torus relative to the eye: the eye's distance from the axis and the unit direction away from it, and
@@ -66,14 +63,13 @@ static void torus_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_TORI, &torus, object->material);
 }
 
-static bool torus_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds torus_primitive_bounds(const void *primitive)
 {
     const Torus *torus = primitive;
     Vector3 half_extents =
         vector_scale(circle_half_extents(vector3_of(&torus->axis_minor)), torus->center_major.w);
-    *bounds = bounds_around(vector3_of(&torus->center_major),
-                            vector_add(half_extents, vector_all(torus->axis_minor.w)));
-    return true;
+    return bounds_around(vector3_of(&torus->center_major),
+                         vector_add(half_extents, vector_all(torus->axis_minor.w)));
 }
 
 static BoundingSphere torus_bounding_sphere(const void *primitive)

@@ -211,38 +211,23 @@ static void mesh_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_TRIANGLES, &triangle, material);
 }
 
-static bool triangle_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+static Bounds triangle_bounds(const Object *object)
 {
-    (void)scene;
     const Vector3 *vertices = object->as.triangle.vertices;
-    *bounds = bounds_of_triangle(vertices[0], vertices[1], vertices[2]);
-    return true;
+    return bounds_of_triangle(vertices[0], vertices[1], vertices[2]);
 }
 
-static bool mesh_bounds(const Scene *scene, const Object *object, Bounds *bounds)
-{
-    const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
-    *bounds = object->as.mesh.is_instance ? instance_bounds(mesh, object) : bounds_empty();
-    if (object->as.mesh.is_instance) return true;
-    for (size_t i = 0; i < mesh->vertex_count; i++)
-        *bounds = bounds_join(*bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
-    return true;
-}
-
-static bool instance_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds instance_primitive_bounds(const void *primitive)
 {
     const Instance *instance = primitive;
-    *bounds = bounds_around((Vector3){instance->rows[0].w, instance->rows[1].w, instance->rows[2].w},
-                            vector3_of(&instance->extent));
-    return true;
+    return bounds_around((Vector3){instance->rows[0].w, instance->rows[1].w, instance->rows[2].w},
+                         vector3_of(&instance->extent));
 }
 
-static bool triangle_primitive_bounds(const void *primitive, Bounds *bounds)
+static Bounds triangle_primitive_bounds(const void *primitive)
 {
     const Triangle *triangle = primitive;
-    *bounds =
-        bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
-    return true;
+    return bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
 }
 
 enum { TRIANGLE_FLAT, TRIANGLE_SMOOTH };
@@ -274,7 +259,6 @@ const ShapeOps triangle_ops = {
 
 const ShapeOps mesh_ops = {
     .type = TYPE_TRIANGLES,
-    .bounds = mesh_bounds,
     .flatten = mesh_flatten,
     .primitive_bounds = instance_primitive_bounds,
 };
