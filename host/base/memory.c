@@ -41,6 +41,13 @@ void *memory_resize(void *memory, size_t count, size_t size)
     return memory_must(realloc(memory, memory_size(count, size)), count, size);
 }
 
+void *memory_copy(const void *items, size_t count, size_t size)
+{
+    void *copy = memory_allocate(count, size);
+    if (count > 0) memcpy(copy, items, count * size);
+    return copy;
+}
+
 char *memory_copy_text(const char *text)
 {
     return memory_copy_part(text, strlen(text));

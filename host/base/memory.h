@@ -7,6 +7,7 @@
 void *memory_allocate(size_t count, size_t size);
 void *memory_allocate_zeroed(size_t count, size_t size);
 void *memory_resize(void *memory, size_t count, size_t size);
+void *memory_copy(const void *items, size_t count, size_t size); // `items` may be NULL if count is 0
 char *memory_copy_text(const char *text);
 char *memory_copy_part(const char *text, size_t length); // ends the copy with a NUL
 

@@ -3,7 +3,6 @@
 #include "host/base/memory.h"
 #include "host/compile/shapes.h"
 #include <stdlib.h>
-#include <string.h>
 
 // Changes every position and every other vector (axes, normals, directions) except those of meshes. Scaling
 // a normal or a direction has no effect, because they need not be unit vectors.
@@ -67,24 +66,19 @@ void scene_scale(Scene *scene, double factor)
     }
 }
 
-static void *copy_of(const void *items, size_t count, size_t size)
-{
-    void *copy = memory_allocate(count, size);
-    if (count > 0) memcpy(copy, items, count * size);
-    return copy;
-}
-
 Scene scene_scaled(const Scene *scene, double factor)
 {
     Scene scaled = *scene;
-    scaled.lights.items = copy_of(scene->lights.items, scene->lights.count, sizeof *scene->lights.items);
+    scaled.lights.items = memory_copy(scene->lights.items, scene->lights.count, sizeof *scene->lights.items);
     scaled.materials.items =
-        copy_of(scene->materials.items, scene->materials.count, sizeof *scene->materials.items);
-    scaled.objects.items = copy_of(scene->objects.items, scene->objects.count, sizeof *scene->objects.items);
-    scaled.meshes.items = copy_of(scene->meshes.items, scene->meshes.count, sizeof *scene->meshes.items);
+        memory_copy(scene->materials.items, scene->materials.count, sizeof *scene->materials.items);
+    scaled.objects.items =
+        memory_copy(scene->objects.items, scene->objects.count, sizeof *scene->objects.items);
+    scaled.meshes.items = memory_copy(scene->meshes.items, scene->meshes.count, sizeof *scene->meshes.items);
     for (size_t i = 0; i < scene->meshes.count; i++) {
         const Mesh *mesh = &scene->meshes.items[i];
-        scaled.meshes.items[i].vertices = copy_of(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
+        scaled.meshes.items[i].vertices =
+            memory_copy(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
     }
     scene_scale(&scaled, factor);
     return scaled;

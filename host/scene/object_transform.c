@@ -4,14 +4,8 @@
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/oval.h"
-#include <string.h>
 
 static const double NUMBER_LARGEST = 1e30; // of scene files
-
-static void *items_copy(const void *items, size_t count, size_t size)
-{
-    return items ? memcpy(memory_allocate(count, size), items, count * size) : NULL;
-}
 
 // A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
 static bool mesh_transform(Mesh *mesh, const Affine *affine)
@@ -65,7 +59,7 @@ static void box_make_mesh(Scene *scene, Object *object)
                                               {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
     Mesh mesh = {.vertices = memory_allocate(8, sizeof *mesh.vertices),
                  .vertex_count = 8,
-                 .triangles = items_copy(triangles, 12, sizeof *triangles),
+                 .triangles = memory_copy(triangles, 12, sizeof *triangles),
                  .triangle_count = 12};
     for (unsigned i = 0; i < 8; i++)
         mesh.vertices[i] = bounds_corner((Bounds){object->as.box.min, object->as.box.max}, i);
