@@ -1,6 +1,7 @@
 // Tests that transformed objects are hit where the same objects are, written out.
 #include "host/scene/affine.h"
 #include "host/scene/describe.h"
+#include "host/scene/object_transform.h"
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/probe.h"
@@ -178,6 +179,16 @@ TEST(a_scale_that_is_nearly_the_same_counts_as_the_same)
         affine_of_steps((Vector3){1, 1 + 3e-6, 1}, (Vector3){10, 20, 30}, (Vector3){0, 0, 0});
     assert_true(affine_keeps_balls(&nearly, &scale));
     assert_false(affine_keeps_balls(&clearly, &scale));
+}
+
+TEST(a_torus_keeps_its_tube)
+{
+    const Affine shrink = affine_of_steps(vector_all(1e-29), vector_all(0), vector_all(0));
+    Object torus = {.type = SHAPE_TORUS, .as.torus = {.axis = {0, 1, 0}, .major = 1, .minor = 1e-300}};
+    Scene scene = {0};
+    const char *problem = object_transform(&scene, &torus, &shrink);
+    assert_non_null(problem);
+    assert_string_equal(problem, "gets a size of 0 or a number beyond 1e30");
 }
 
 TEST_MAIN(probe_open, probe_close)

@@ -16,10 +16,6 @@ enum { SHAPE_OPS_FORMS = 4 };
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
 typedef struct {
     int type; // TYPE_… of its primitives
-    // Offsets in Object, up to the first 0, of positions and other vectors (axes, normals), and of lengths.
-    size_t vectors[7], lengths[3];
-    // Restores what transforms of its vectors break, or NULL.
-    void (*restore)(Object *object);
     // Returns the bounds of an object other than a mesh. NULL means always unbounded.
     Bounds (*bounds)(const Object *object);
     // Adds the primitive that flattening->part selects (host/compile/flatten.h).

@@ -1,7 +1,7 @@
 #include "host/compile/transform.h"
 
 #include "host/base/memory.h"
-#include "host/compile/shapes.h"
+#include "host/scene/shape_members.h"
 #include <stdlib.h>
 
 // Changes every position and every other vector (axes, normals, directions) except those of meshes. Scaling
@@ -21,11 +21,12 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
         change(&scene->lights.items[i].area.across[1], factor);
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
-        Object *object = &scene->objects.items[i];
-        const ShapeOps *shape = shape_ops[object->type];
-        for (const size_t *offset = shape->vectors; *offset > 0; offset++)
-            change((Vector3 *)(void *)((char *)object + *offset), factor);
-        if (shape->restore) shape->restore(object);
+        const ShapeMembers members = shape_members(&scene->objects.items[i]);
+        for (Vector3 *const *point = members.points; *point; point++)
+            change(*point, factor);
+        for (Vector3 *const *direction = members.directions; *direction; direction++)
+            change(*direction, factor);
+        box_order(&scene->objects.items[i]);
     }
 }
 
@@ -42,8 +43,9 @@ void scene_scale(Scene *scene, double factor)
     if (scene->camera.projection == PROJECTION_ORTHOGRAPHIC) scene->camera.half_tangent *= factor;
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        for (const size_t *offset = shape_ops[object->type]->lengths; *offset > 0; offset++)
-            *(double *)(void *)((char *)object + *offset) *= factor;
+        const ShapeMembers members = shape_members(object);
+        for (double *const *length = members.lengths; *length; length++)
+            **length *= factor;
         for (int row = 0; row < 3 && object->type == SHAPE_MESH && object->as.mesh.is_instance; row++)
             object->as.mesh.transform.rows[row][3] *= factor;
     }

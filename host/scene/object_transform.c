@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/oval.h"
+#include "host/scene/shape_members.h"
 
 static const double NUMBER_LARGEST = 1e30; // of scene files
 
@@ -24,12 +25,6 @@ static bool mesh_transform(Mesh *mesh, const Affine *affine)
         corners[2] = second;
     }
     return fits;
-}
-
-static bool triangle_transform(Object *object, const Affine *affine)
-{
-    affine_triangle(affine, object->as.triangle.vertices, object->as.triangle.normals);
-    return true;
 }
 
 static bool instance_transform(const Mesh *mesh, Object *object, const Affine *affine)
@@ -68,155 +63,69 @@ static void box_make_mesh(Scene *scene, Object *object)
     array_push(scene->meshes, mesh);
 }
 
-// The functions below transform a shape. They return false, and change nothing, if it would no longer be one
-// of its type, and leave numbers that object_transform checks.
-
-static bool sphere_transform(Object *object, const Affine *affine)
+// Returns whether a shape stays one of its type, and sets the scale of one with an axis or a radius.
+static bool keeps_type(const Object *object, const ShapeMembers *members, const Affine *affine,
+                       AxisScale *scale)
 {
-    AxisScale scale;
-    if (!affine_keeps_balls(affine, &scale)) return false;
-    object->as.sphere.center = affine_point(affine, object->as.sphere.center);
-    object->as.sphere.radius *= scale.across;
-    return true;
+    if (object->type == SHAPE_SPHERE || object->type == SHAPE_TORUS) return affine_keeps_balls(affine, scale);
+    const bool is_straight = object->type != SHAPE_DISC;
+    return !members->lengths[0] || affine_keeps_circles(affine, *members->directions[0], is_straight, scale);
 }
 
-static bool plane_transform(Object *object, const Affine *affine)
+// Transforms a shape other than a mesh. Returns false, and changes nothing, if it would no longer be one of
+// its type. Leaves numbers that object_transform checks.
+static bool shape_transform(Object *object, const Affine *affine)
 {
-    const Affine for_normals = affine_for_normals(affine);
-    object->as.plane.point = affine_point(affine, object->as.plane.point);
-    object->as.plane.normal = affine_normal(&for_normals, object->as.plane.normal);
-    return true;
-}
-
-static bool disc_transform(Object *object, const Affine *affine)
-{
-    const Affine for_normals = affine_for_normals(affine);
-    AxisScale scale;
-    if (!affine_keeps_circles(affine, object->as.disc.normal, false, &scale)) return false;
-    object->as.disc.center = affine_point(affine, object->as.disc.center);
-    object->as.disc.normal = affine_normal(&for_normals, object->as.disc.normal);
-    object->as.disc.radius *= scale.across;
-    return true;
-}
-
-static bool box_transform(Object *object, const Affine *affine)
-{
-    const Vector3 a = affine_point(affine, object->as.box.min), b = affine_point(affine, object->as.box.max);
-    object->as.box.min = vector_min(a, b);
-    object->as.box.max = vector_max(a, b);
-    return true;
-}
-
-static bool cylinder_transform(Object *object, const Affine *affine)
-{
-    AxisScale scale;
-    if (!affine_keeps_circles(affine, object->as.cylinder.axis, true, &scale)) return false;
-    object->as.cylinder.from = affine_point(affine, object->as.cylinder.from);
-    object->as.cylinder.axis = affine_direction(affine, object->as.cylinder.axis);
-    object->as.cylinder.radius *= scale.across;
-    return true;
-}
-
-static bool cone_transform(Object *object, const Affine *affine)
-{
-    AxisScale scale;
-    if (!affine_keeps_circles(affine, object->as.cone.axis, true, &scale)) return false;
-    object->as.cone.from = affine_point(affine, object->as.cone.from);
-    object->as.cone.axis = affine_direction(affine, object->as.cone.axis);
-    object->as.cone.radius[0] *= scale.across;
-    object->as.cone.radius[1] *= scale.across;
-    object->as.cone.slope *= scale.across / vector_length(scale.along);
-    return true;
-}
-
-static bool torus_transform(Object *object, const Affine *affine)
-{
-    AxisScale scale;
-    if (!affine_keeps_balls(affine, &scale)) return false;
-    object->as.torus.center = affine_point(affine, object->as.torus.center);
-    object->as.torus.axis = affine_direction(affine, object->as.torus.axis);
-    object->as.torus.major *= scale.across;
-    object->as.torus.minor *= scale.across;
-    return true;
-}
-
-// The radius r at the height h is r^2 = 4 f h.
-static bool paraboloid_transform(Object *object, const Affine *affine)
-{
-    AxisScale scale;
-    if (!affine_keeps_circles(affine, object->as.paraboloid.axis, true, &scale)) return false;
+    if (object->type == SHAPE_OVAL) return oval_transform(object, affine);
+    const ShapeMembers members = shape_members(object);
+    if (object->type == SHAPE_TRIANGLE) {
+        affine_triangle(affine, object->as.triangle.vertices, object->as.triangle.normals);
+        return true;
+    }
+    AxisScale scale = {0};
+    if (!keeps_type(object, &members, affine, &scale)) return false;
+    for (Vector3 *const *point = members.points; *point; point++)
+        **point = affine_point(affine, **point);
+    box_order(object);
+    Vector3 *direction = members.directions[0];
+    if (object->type == SHAPE_PLANE || object->type == SHAPE_DISC) {
+        const Affine for_normals = affine_for_normals(affine);
+        *direction = affine_normal(&for_normals, *direction);
+    } else if (direction) {
+        *direction = affine_direction(affine, *direction);
+    }
     const double along = vector_length(scale.along);
-    object->as.paraboloid.apex = affine_point(affine, object->as.paraboloid.apex);
-    object->as.paraboloid.axis = affine_direction(affine, object->as.paraboloid.axis);
-    object->as.paraboloid.height *= along;
-    object->as.paraboloid.focal_length *= scale.across / along * scale.across;
+    double factors[] = {scale.across, scale.across};
+    if (object->type == SHAPE_CONE) object->as.cone.slope *= scale.across / along;
+    if (object->type == SHAPE_PARABOLOID) { // whose radius r at the height h is r^2 = 4 f h
+        factors[0] = scale.across / along * scale.across;
+        factors[1] = along;
+    }
+    for (size_t i = 0; members.lengths[i]; i++)
+        *members.lengths[i] *= factors[i];
     return true;
 }
 
-// A 0 ends each list of offsets. Vectors and lengths must stay within the range, the axis different from 0,
-// and `positive` lengths above 0.
-static const struct {
-    bool (*transform)(Object *object, const Affine *affine);
-    size_t vectors[5], axis, positive[3], lengths[4];
-} shapes[SHAPE_MESH] = {
-    [SHAPE_SPHERE] = {sphere_transform, .vectors = {offsetof(Object, as.sphere.center)},
-                      .positive = {offsetof(Object, as.sphere.radius)}},
-    [SHAPE_PLANE] = {plane_transform, .vectors = {offsetof(Object, as.plane.point)}},
-    [SHAPE_DISC] = {disc_transform, .vectors = {offsetof(Object, as.disc.center)},
-                    .positive = {offsetof(Object, as.disc.radius)}},
-    [SHAPE_BOX] = {box_transform, .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)}},
-    [SHAPE_CYLINDER] = {cylinder_transform,
-                        .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
-                        .axis = offsetof(Object, as.cylinder.axis),
-                        .positive = {offsetof(Object, as.cylinder.radius)}},
-    [SHAPE_CONE] = {cone_transform,
-                    .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
-                    .axis = offsetof(Object, as.cone.axis),
-                    .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1]),
-                                offsetof(Object, as.cone.slope)}},
-    [SHAPE_TRIANGLE] = {triangle_transform, .vectors = {offsetof(Object, as.triangle.vertices[0]),
-                                                        offsetof(Object, as.triangle.vertices[1]),
-                                                        offsetof(Object, as.triangle.vertices[2])}},
-    [SHAPE_TORUS] = {torus_transform,
-                     .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
-                     .axis = offsetof(Object, as.torus.axis),
-                     .positive = {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)}},
-    [SHAPE_PARABOLOID] = {paraboloid_transform,
-                          .vectors = {offsetof(Object, as.paraboloid.apex),
-                                      offsetof(Object, as.paraboloid.axis)},
-                          .axis = offsetof(Object, as.paraboloid.axis),
-                          .positive = {offsetof(Object, as.paraboloid.focal_length)},
-                          .lengths = {offsetof(Object, as.paraboloid.height)}},
-    [SHAPE_OVAL] = {oval_transform,
-                    .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),
-                                offsetof(Object, as.oval.axes[1]), offsetof(Object, as.oval.axes[2])}},
-};
-
-// Return the member of an object at an offset.
-static double number_at(const Object *object, size_t offset)
+// Returns whether all numbers are within the range, and those above 0 that must be.
+static bool numbers_fit(Object *object)
 {
-    return *(const double *)(const void *)((const char *)object + offset);
-}
-
-static Vector3 vector_at(const Object *object, size_t offset)
-{
-    return *(const Vector3 *)(const void *)((const char *)object + offset);
-}
-
-static bool numbers_fit(const Object *object)
-{
+    const ShapeMembers members = shape_members(object);
+    const bool is_cone = object->type == SHAPE_CONE;
     bool fits =
-        shapes[object->type].axis == 0 || !vector_is_zero(vector_at(object, shapes[object->type].axis));
-    for (const size_t *offset = shapes[object->type].vectors; *offset > 0; offset++)
-        fits &= vector_is_within(vector_at(object, *offset), NUMBER_LARGEST);
-    for (const size_t *offset = shapes[object->type].positive; *offset > 0; offset++)
-        fits &= number_at(object, *offset) > 0 && number_at(object, *offset) <= NUMBER_LARGEST;
-    for (const size_t *offset = shapes[object->type].lengths; *offset > 0; offset++)
-        fits &= number_at(object, *offset) <= NUMBER_LARGEST;
-    if (object->type != SHAPE_CONE) return fits;
-    const double widest = object->as.cone.finite ? object->as.cone.radius[0] + object->as.cone.radius[1]
-                                                 : object->as.cone.slope;
-    return fits && widest > 0;
+        object->type == SHAPE_TRIANGLE || !members.directions[0] || !vector_is_zero(*members.directions[0]);
+    for (Vector3 *const *point = members.points; *point; point++)
+        fits &= vector_is_within(**point, NUMBER_LARGEST);
+    for (Vector3 *const *direction = members.directions; *direction; direction++)
+        fits &= vector_is_within(**direction, NUMBER_LARGEST);
+    for (size_t i = 0; members.lengths[i]; i++) {
+        const bool may_be_zero = is_cone || (object->type == SHAPE_PARABOLOID && i == 1);
+        fits &= *members.lengths[i] <= NUMBER_LARGEST && (may_be_zero || *members.lengths[i] > 0);
+    }
+    if (!is_cone) return fits;
+    const double slope = object->as.cone.slope,
+                 widest =
+                     object->as.cone.finite ? object->as.cone.radius[0] + object->as.cone.radius[1] : slope;
+    return fits && slope <= NUMBER_LARGEST && widest > 0;
 }
 
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
@@ -229,7 +138,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
                                                       : mesh_transform(mesh, affine);
         return fits ? NULL : out_of_range;
     }
-    if (!shapes[object->type].transform(object, affine)) {
+    if (!shape_transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
             return "with an image would change its shape, and then cannot have one";
         oval_make(object);

@@ -1,5 +1,6 @@
 #include "host/scene/oval.h"
 
+#include "host/scene/shape_members.h"
 #include <math.h>
 #include <string.h>
 
@@ -14,67 +15,55 @@ static void axes_set(Object *oval, Vector3 center, Vector3 along, double across,
     oval->as.oval.axes[2] = vector_scale(w, length);
 }
 
-// Sets the map of a solid with ends, whose middle is the unit shape's.
-static void ends_set(Object *oval, Vector3 from, Vector3 axis, double widest)
-{
-    const Vector3 half = vector_scale(axis, 0.5);
-    oval->as.oval.finite = true;
-    oval->as.oval.half_height = 1;
-    axes_set(oval, vector_add(from, half), axis, widest, vector_length(half));
-}
-
 void oval_make(Object *object)
 {
-    const Object from = *object;
+    Object from = *object;
+    const ShapeMembers members = shape_members(&from);
+    const Vector3 place = *members.points[0];
+    double across = *members.lengths[0], widest = across; // of an infinite shape's map, and of one with ends
     object->type = SHAPE_OVAL;
     memset(&object->as, 0, sizeof object->as);
     object->as.oval.unit = from.type;
-    switch (from.type) {
-    case SHAPE_SPHERE:
-        object->as.oval.center = from.as.sphere.center;
+    if (from.type == SHAPE_SPHERE) {
+        object->as.oval.center = place;
         for (int i = 0; i < 3; i++)
-            object->as.oval.axes[i] = vector_scale((Vector3){i == 0, i == 1, i == 2}, from.as.sphere.radius);
+            object->as.oval.axes[i] = vector_scale((Vector3){i == 0, i == 1, i == 2}, across);
         return;
-    case SHAPE_DISC:
-        axes_set(object, from.as.disc.center, from.as.disc.normal, from.as.disc.radius, from.as.disc.radius);
-        return;
-    case SHAPE_CYLINDER:
+    }
+    Vector3 axis = *members.directions[0];
+    if (from.type == SHAPE_CYLINDER) {
+        object->as.oval.finite = from.as.cylinder.finite;
         object->as.oval.caps = from.as.cylinder.caps;
-        axes_set(object, from.as.cylinder.from, from.as.cylinder.axis, from.as.cylinder.radius,
-                 from.as.cylinder.radius);
-        if (from.as.cylinder.finite)
-            ends_set(object, from.as.cylinder.from, from.as.cylinder.axis, from.as.cylinder.radius);
-        return;
-    case SHAPE_CONE: {
-        const double *radii = from.as.cone.radius, widest = fmax(radii[0], radii[1]);
+    } else if (from.type == SHAPE_CONE) {
+        const double *radii = from.as.cone.radius;
+        object->as.oval.finite = from.as.cone.finite;
+        across = 1;
+        widest = fmax(radii[0], radii[1]);
         object->as.oval.caps = from.as.cone.caps;
         object->as.oval.rise = from.as.cone.slope;
-        axes_set(object, from.as.cone.from, from.as.cone.axis, 1, 1);
-        if (!from.as.cone.finite) return;
-        ends_set(object, from.as.cone.from, from.as.cone.axis, widest);
-        object->as.oval.radii[0] = radii[0] / widest;
-        object->as.oval.radii[1] = radii[1] / widest;
-        return;
-    }
-    case SHAPE_TORUS: {
-        const double size = from.as.torus.major + from.as.torus.minor;
-        axes_set(object, from.as.torus.center, from.as.torus.axis, size, size);
-        object->as.oval.radii[0] = from.as.torus.major / size;
-        object->as.oval.radii[1] = from.as.torus.minor / size;
-        return;
-    }
-    default: { // a paraboloid
-        const double focal_length = from.as.paraboloid.focal_length, height = from.as.paraboloid.height;
-        const Vector3 axis = vector_normalize(from.as.paraboloid.axis);
+        for (int i = 0; i < 2 && from.as.cone.finite; i++)
+            object->as.oval.radii[i] = radii[i] / widest;
+    } else if (from.type == SHAPE_TORUS) {
+        across = from.as.torus.major + from.as.torus.minor;
+        object->as.oval.radii[0] = from.as.torus.major / across;
+        object->as.oval.radii[1] = from.as.torus.minor / across;
+    } else if (from.type == SHAPE_PARABOLOID) {
+        const double focal_length = across, height = from.as.paraboloid.height;
+        object->as.oval.finite = from.as.paraboloid.finite;
+        across = 4 * focal_length;
+        widest = 2 * sqrt(focal_length * height);
+        axis = vector_normalize(axis);
+        if (from.as.paraboloid.finite) axis = vector_scale(axis, height);
         object->as.oval.caps = from.as.paraboloid.caps;
         object->as.oval.rise = 1;
-        axes_set(object, from.as.paraboloid.apex, axis, 4 * focal_length, 4 * focal_length);
-        if (from.as.paraboloid.finite)
-            ends_set(object, from.as.paraboloid.apex, vector_scale(axis, height),
-                     2 * sqrt(focal_length * height));
+    }
+    if (!object->as.oval.finite) {
+        axes_set(object, place, axis, across, across);
         return;
     }
-    }
+    const Vector3 half = vector_scale(axis, 0.5); // the unit shape's middle is that of the axis
+    object->as.oval.half_height = 1;
+    axes_set(object, vector_add(place, half), axis, widest, vector_length(half));
 }
 
 // Turns two axes in the space of the unit shape so that they become perpendicular (Hestenes, Inversion of
@@ -159,23 +148,17 @@ Object oval_unit(const Object *oval)
     const double half = oval->as.oval.half_height, *radii = oval->as.oval.radii, rise = oval->as.oval.rise;
     const Vector3 low = {0, 0, finite ? -half : 0}, z = {0, 0, 1}, up = {0, 0, finite ? 2 * half : 1};
     Object unit = {.type = oval->as.oval.unit, .material = oval->material};
+    const ShapeMembers members = shape_members(&unit);
+    *members.points[0] = low;
+    if (members.directions[0]) *members.directions[0] = z;
+    *members.lengths[0] = 1;
     switch (unit.type) {
-    case SHAPE_SPHERE:
-        unit.as.sphere.radius = 1;
-        break;
-    case SHAPE_DISC:
-        unit.as.disc.normal = z;
-        unit.as.disc.radius = 1;
-        break;
     case SHAPE_CYLINDER:
-        unit.as.cylinder.from = low;
         unit.as.cylinder.axis = up;
-        unit.as.cylinder.radius = 1;
         unit.as.cylinder.finite = finite;
         unit.as.cylinder.caps = caps;
         break;
     case SHAPE_CONE:
-        unit.as.cone.from = low;
         unit.as.cone.axis = up;
         unit.as.cone.radius[0] = radii[0];
         unit.as.cone.radius[1] = radii[1];
@@ -184,17 +167,17 @@ Object oval_unit(const Object *oval)
         unit.as.cone.caps = caps;
         break;
     case SHAPE_TORUS:
-        unit.as.torus.axis = z;
         unit.as.torus.major = radii[0];
         unit.as.torus.minor = radii[1];
         break;
-    default: // a paraboloid
-        unit.as.paraboloid.apex = low;
-        unit.as.paraboloid.axis = z;
+    case SHAPE_PARABOLOID:
         unit.as.paraboloid.focal_length = finite ? 0.125 / half : 0.25 * rise;
         unit.as.paraboloid.height = finite ? 2 * half : 0;
         unit.as.paraboloid.finite = finite;
         unit.as.paraboloid.caps = caps;
+        break;
+    default: // a sphere or a disc
+        break;
     }
     return unit;
 }

@@ -5,13 +5,6 @@ static Bounds box_bounds(const Object *object)
     return (Bounds){object->as.box.min, object->as.box.max};
 }
 
-static void box_restore(Object *object)
-{
-    Vector3 a = object->as.box.min, b = object->as.box.max;
-    object->as.box.min = vector_min(a, b);
-    object->as.box.max = vector_max(a, b);
-}
-
 static void box_flatten(Flattening *flattening, const Object *object)
 {
     const Box box = {.low = scalar4_of(point_from_eye(&flattening->rounding, object->as.box.min), 0),
@@ -38,8 +31,6 @@ static void box_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps box_ops = {
     .type = TYPE_BOXES,
-    .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)},
-    .restore = box_restore,
     .bounds = box_bounds,
     .flatten = box_flatten,
     .forms = {"box"},

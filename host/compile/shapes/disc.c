@@ -70,8 +70,6 @@ static void disc_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps disc_ops = {
     .type = TYPE_DISCS,
-    .vectors = {offsetof(Object, as.disc.center), offsetof(Object, as.disc.normal)},
-    .lengths = {offsetof(Object, as.disc.radius)},
     .bounds = disc_bounds,
     .flatten = disc_flatten,
     .forms = {"disc"},

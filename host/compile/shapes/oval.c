@@ -92,8 +92,6 @@ static double oval_largest_coordinate(const void *primitive)
 // Lacks random shapes; tests/test_ovals.c transforms others.
 const ShapeOps oval_ops = {
     .type = TYPE_OVALS,
-    .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),
-                offsetof(Object, as.oval.axes[1]), offsetof(Object, as.oval.axes[2])},
     .bounds = oval_bounds,
     .flatten = oval_flatten,
     .primitive_bounds = oval_primitive_bounds,

@@ -141,8 +141,6 @@ static void paraboloid_randomize(RandomShape *made, unsigned form, Random *rando
 
 const ShapeOps paraboloid_ops = {
     .type = TYPE_PARABOLOIDS,
-    .vectors = {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
-    .lengths = {offsetof(Object, as.paraboloid.focal_length), offsetof(Object, as.paraboloid.height)},
     .bounds = paraboloid_bounds,
     .flatten = paraboloid_flatten,
     .forms = {"capped paraboloid", "open paraboloid", "infinite paraboloid"},

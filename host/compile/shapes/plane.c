@@ -33,7 +33,6 @@ static void plane_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps plane_ops = {
     .type = TYPE_PLANES,
-    .vectors = {offsetof(Object, as.plane.point), offsetof(Object, as.plane.normal)},
     .flatten = plane_flatten,
     .forms = {"plane"},
     .randomize = plane_randomize,

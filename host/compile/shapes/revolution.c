@@ -248,8 +248,6 @@ static void cylinder_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps cylinder_ops = {
     .type = TYPE_CYLINDERS,
-    .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
-    .lengths = {offsetof(Object, as.cylinder.radius)},
     .bounds = cylinder_bounds,
     .flatten = cylinder_flatten,
     .forms = {"capped cylinder", "open cylinder", "infinite cylinder"},
@@ -280,8 +278,6 @@ static void cone_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps cone_ops = {
     .type = TYPE_CONES,
-    .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
-    .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1])},
     .bounds = cone_bounds,
     .flatten = cone_flatten,
     .forms = {"capped cone", "open cone", "pointed cone", "infinite cone"},

@@ -73,8 +73,6 @@ static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps sphere_ops = {
     .type = TYPE_SPHERES,
-    .vectors = {offsetof(Object, as.sphere.center)},
-    .lengths = {offsetof(Object, as.sphere.radius)},
     .bounds = sphere_bounds,
     .flatten = sphere_flatten,
     .forms = {"sphere"},

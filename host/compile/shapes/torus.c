@@ -99,8 +99,6 @@ static void torus_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps torus_ops = {
     .type = TYPE_TORI,
-    .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
-    .lengths = {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)},
     .bounds = torus_bounds,
     .flatten = torus_flatten,
     .forms = {"torus", "thin torus", "fat torus", "spindle torus"},

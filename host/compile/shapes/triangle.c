@@ -247,9 +247,6 @@ static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
 
 const ShapeOps triangle_ops = {
     .type = TYPE_TRIANGLES,
-    .vectors = {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
-                offsetof(Object, as.triangle.vertices[2]), offsetof(Object, as.triangle.normals[0]),
-                offsetof(Object, as.triangle.normals[1]), offsetof(Object, as.triangle.normals[2])},
     .bounds = triangle_bounds,
     .flatten = triangle_flatten,
     .forms = {"triangle", "smooth triangle"},
