@@ -52,6 +52,16 @@ double map_condition(const InstanceMap *map)
     return condition;
 }
 
+void map_round(const Rounding *rounding, const InstanceMap *map, const double place[3], scalar4 rows[3],
+               scalar4 inverses[3])
+{
+    for (int i = 0; i < 3; i++) {
+        rows[i] =
+            scalar4_of(vector_rounded(rounding, vector_from(map->rows[i])), rounded(rounding, place[i]));
+        inverses[i] = scalar4_of(vector_rounded(rounding, vector_from(map->inverses[i])), 0);
+    }
+}
+
 static double map_largest(const double rows[3][3])
 {
     double largest = 0;
@@ -198,29 +208,21 @@ void instance_flatten(Flattening *flattening, const Object *object, uint32_t sha
     double place[3] = {seen.x, seen.y, seen.z};
     const double eye[3] = {rounding->eye.x, rounding->eye.y, rounding->eye.z};
     const double half[3] = {shared->extent.x, shared->extent.y, shared->extent.z};
-    double rows[3][4], inverses[3][3], extent[3];
+    double extent[3];
     for (int i = 0; i < 3; i++) {
         const double *row = transform->rows[i];
         extent[i] = 0;
-        for (int k = 0; k < 3; k++) {
-            rows[i][k] = rounded(rounding, map.rows[i][k]);
-            inverses[i][k] = rounded(rounding, map.inverses[i][k]);
+        for (int k = 0; k < 3; k++)
             extent[i] += fabs(map.rows[i][k]) * half[k];
-        }
         if (rounding->is_double)
-            place[i] =
-                (double)(quad3_dot((Quad3){row[0], row[1], row[2]}, quad3(shared->center)) + row[3] - eye[i]);
-        rows[i][3] = rounded(rounding, place[i]);
+            place[i] = (double)(quad3_dot(quad3(vector_from(row)), quad3(shared->center)) + row[3] - eye[i]);
     }
     const bool replaces = object->as.mesh.has_own_material && shared->material == 0;
     Instance instance = {
         .extent = {extent[0], extent[1], extent[2], map_condition(&map)},
         .id = {0, shared_mesh, replaces ? 1 + object->material : 0, 0},
     };
-    for (int i = 0; i < 3; i++) {
-        instance.rows[i] = (scalar4){rows[i][0], rows[i][1], rows[i][2], rows[i][3]};
-        instance.inverses[i] = (scalar4){inverses[i][0], inverses[i][1], inverses[i][2], 0};
-    }
+    map_round(rounding, &map, place, instance.rows, instance.inverses);
     instance.inverses[0].w = sqrt(fabs(map.determinant));
     const uint32_t first = (uint32_t)flattening->primitive_count,
                    count = (uint32_t)object_primitive_count(flattening->scene, object);

@@ -39,6 +39,10 @@ InstanceMap instance_map(const Affine *transform, double scale, bool is_exact);
 // Returns the largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
 double map_condition(const InstanceMap *map);
 
+// Rounds the map into the rows of a flat struct, with `place` in their last numbers.
+void map_round(const Rounding *rounding, const InstanceMap *map, const double place[3], scalar4 rows[3],
+               scalar4 inverses[3]);
+
 // Returns a plan of which objects share meshes, or NULL if none does.
 InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings);
 void instance_plan_free(InstancePlan *plan);

@@ -35,15 +35,10 @@ Vector3 affine_point(const Affine *affine, Vector3 p)
                      moved.z + affine->rows[2][3]};
 }
 
-static Vector3 affine_row(const Affine *affine, int row)
-{
-    const double *numbers = affine->rows[row];
-    return (Vector3){numbers[0], numbers[1], numbers[2]};
-}
-
 double affine_determinant(const Affine *affine)
 {
-    return vector_dot(affine_row(affine, 0), vector_cross(affine_row(affine, 1), affine_row(affine, 2)));
+    return vector_dot(vector_from(affine->rows[0]),
+                      vector_cross(vector_from(affine->rows[1]), vector_from(affine->rows[2])));
 }
 
 // Transforms normals: the transposed inverse times |determinant|, whose rows are cross products of rows.
@@ -53,7 +48,8 @@ Affine affine_for_normals(const Affine *affine)
     Affine cofactors = {0};
     for (int row = 0; row < 3; row++) {
         Vector3 cross = vector_scale(
-            vector_cross(affine_row(affine, (row + 1) % 3), affine_row(affine, (row + 2) % 3)), side);
+            vector_cross(vector_from(affine->rows[(row + 1) % 3]), vector_from(affine->rows[(row + 2) % 3])),
+            side);
         memcpy(cofactors.rows[row], (const double[3]){cross.x, cross.y, cross.z}, 3 * sizeof(double));
     }
     return cofactors;

@@ -14,8 +14,8 @@ static Vector3 oval_half_extents(const Object *object)
     if (object->as.oval.finite) line = object->as.oval.half_height;
     for (int i = 0; i < 3; i++) {
         const double *row = map.rows[i];
-        half[i] = ball * vector_length((Vector3){row[0], row[1], row[2]}) +
-                  disc * hypotenuse(row[0], row[1]) + line * fabs(row[2]);
+        half[i] =
+            ball * vector_length(vector_from(row)) + disc * hypotenuse(row[0], row[1]) + line * fabs(row[2]);
     }
     return (Vector3){half[0], half[1], half[2]};
 }
@@ -31,8 +31,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
     const Rounding *rounding = &flattening->rounding;
     const Affine transform = oval_map(object);
     const Vector3 place = point_from_eye(rounding, object->as.oval.center);
-    const double *radii = object->as.oval.radii, half_height = object->as.oval.half_height,
-                 places[3] = {place.x, place.y, place.z};
+    const double *radii = object->as.oval.radii, half_height = object->as.oval.half_height;
     const bool is_bounded = oval_is_bounded(object);
     double least, most;
     int exponent;
@@ -53,13 +52,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
                 (object->as.oval.caps ? REVOLUTION_CAPPED : 0u),
         .id.z = object->as.oval.unit,
     };
-    for (int i = 0; i < 3; i++) {
-        const double *row = map.rows[i], *inverse = map.inverses[i];
-        oval.rows[i] = (scalar4){rounded(rounding, row[0]), rounded(rounding, row[1]),
-                                 rounded(rounding, row[2]), places[i]};
-        oval.inverses[i] = (scalar4){rounded(rounding, inverse[0]), rounded(rounding, inverse[1]),
-                                     rounded(rounding, inverse[2]), 0};
-    }
+    map_round(rounding, &map, (const double[]){place.x, place.y, place.z}, oval.rows, oval.inverses);
     oval.inverses[0].w = unit / least * (1 + 1e-6); // more than the roundings
     oval.inverses[1].w = reach;
     if (object->as.oval.unit == SHAPE_TORUS) {
