@@ -68,7 +68,7 @@ FeatureSet features_of(const Scene *scene)
     FeatureSet set = materials_union(scene, material_features);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        set |= shape_features[shape_ops[object->type]->type];
+        set |= shape_features[shape_primitive_type(object->type)];
         if (object->type == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
         if (object_is_smooth(scene, object)) set |= FEATURE_SMOOTH_NORMALS;
     }

@@ -52,7 +52,7 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
             counts[TYPE_INSTANCES]++;
             continue;
         }
-        counts[shape_ops[object->type]->type] += count;
+        counts[shape_primitive_type(object->type)] += count;
         if (object_is_smooth(scene, object)) normals_count += count;
         if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
     }

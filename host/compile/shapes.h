@@ -15,7 +15,6 @@ enum { SHAPE_OPS_FORMS = 4 };
 // An Object is the scene's, in double and in world coordinates; a primitive is the flat struct of
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
 typedef struct {
-    int type; // TYPE_… of its primitives
     // Returns the bounds of an object other than a mesh. NULL means always unbounded.
     Bounds (*bounds)(const Object *object);
     // Adds the primitive that flattening->part selects (host/compile/flatten.h).
@@ -39,6 +38,12 @@ typedef struct {
 
 // Indexed by ShapeType, whose values except SHAPE_MESH are those of TYPE_….
 extern const ShapeOps *const shape_ops[SHAPE_COUNT];
+
+// Returns the TYPE_… of a shape's primitives.
+static inline unsigned shape_primitive_type(ShapeType type)
+{
+    return type == SHAPE_MESH ? TYPE_TRIANGLES : (unsigned)type;
+}
 
 // Return the bounds of an object and of a primitive, bounds_everywhere() if it is unbounded.
 Bounds object_bounds(const Scene *scene, const Object *object);

@@ -30,7 +30,6 @@ static void box_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps box_ops = {
-    .type = TYPE_BOXES,
     .bounds = box_bounds,
     .flatten = box_flatten,
     .forms = {"box"},

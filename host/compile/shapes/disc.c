@@ -69,7 +69,6 @@ static void disc_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps disc_ops = {
-    .type = TYPE_DISCS,
     .bounds = disc_bounds,
     .flatten = disc_flatten,
     .forms = {"disc"},

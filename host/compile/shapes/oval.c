@@ -84,7 +84,6 @@ static double oval_largest_coordinate(const void *primitive)
 
 // Lacks random shapes; tests/test_ovals.c transforms others.
 const ShapeOps oval_ops = {
-    .type = TYPE_OVALS,
     .bounds = oval_bounds,
     .flatten = oval_flatten,
     .primitive_bounds = oval_primitive_bounds,

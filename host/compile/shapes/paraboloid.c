@@ -140,7 +140,6 @@ static void paraboloid_randomize(RandomShape *made, unsigned form, Random *rando
 }
 
 const ShapeOps paraboloid_ops = {
-    .type = TYPE_PARABOLOIDS,
     .bounds = paraboloid_bounds,
     .flatten = paraboloid_flatten,
     .forms = {"capped paraboloid", "open paraboloid", "infinite paraboloid"},

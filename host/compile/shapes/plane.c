@@ -32,7 +32,6 @@ static void plane_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps plane_ops = {
-    .type = TYPE_PLANES,
     .flatten = plane_flatten,
     .forms = {"plane"},
     .randomize = plane_randomize,

@@ -8,6 +8,27 @@ typedef struct {
     bool finite, caps, only_inside;
 } RevolutionGiven;
 
+static RevolutionGiven revolution_given(const Object *object)
+{
+    if (object->type == SHAPE_CYLINDER)
+        return (RevolutionGiven){.from = object->as.cylinder.from,
+                                 .axis = object->as.cylinder.axis,
+                                 .base_radius = object->as.cylinder.radius,
+                                 .end_radius = object->as.cylinder.radius,
+                                 .finite = object->as.cylinder.finite,
+                                 .caps = object->as.cylinder.caps,
+                                 .only_inside = object->as.cylinder.only_inside};
+    const bool finite = object->as.cone.finite;
+    return (RevolutionGiven){.from = object->as.cone.from,
+                             .axis = object->as.cone.axis,
+                             .base_radius = finite ? object->as.cone.radius[0] : 0,
+                             .end_radius = finite ? object->as.cone.radius[1] : 0,
+                             .infinite_slope = object->as.cone.slope,
+                             .finite = finite,
+                             .caps = object->as.cone.caps,
+                             .only_inside = object->as.cone.only_inside};
+}
+
 // Rounds both ends as points, so that they stay where the points of other objects are rounded to. If that
 // turns the axis of a short shape far away, or leaves none, rounds only its base, and the shape keeps its
 // form.
@@ -143,63 +164,24 @@ static void revolution_set_power(Revolution *shape, Flattening *flattening, cons
                              (double)squared, given->finite ? (double)(exact.low * length) : 0};
 }
 
-static void revolution_flatten(Flattening *flattening, int type, const Object *object,
-                               const RevolutionGiven *given)
+static void revolution_flatten(Flattening *flattening, const Object *object)
 {
-    Revolution shape = revolution_rounded(&flattening->rounding, given);
-    revolution_set_power(&shape, flattening, given);
-    primitive_add(flattening, type, &shape, object->material);
-}
-
-static void cylinder_flatten(Flattening *flattening, const Object *object)
-{
-    const double radius = object->as.cylinder.radius;
-    const RevolutionGiven given = {.from = object->as.cylinder.from,
-                                   .axis = object->as.cylinder.axis,
-                                   .base_radius = radius,
-                                   .end_radius = radius,
-                                   .finite = object->as.cylinder.finite,
-                                   .caps = object->as.cylinder.caps,
-                                   .only_inside = object->as.cylinder.only_inside};
-    revolution_flatten(flattening, TYPE_CYLINDERS, object, &given);
-}
-
-static void cone_flatten(Flattening *flattening, const Object *object)
-{
-    const bool finite = object->as.cone.finite;
-    const RevolutionGiven given = {.from = object->as.cone.from,
-                                   .axis = object->as.cone.axis,
-                                   .base_radius = finite ? object->as.cone.radius[0] : 0,
-                                   .end_radius = finite ? object->as.cone.radius[1] : 0,
-                                   .infinite_slope = object->as.cone.slope,
-                                   .finite = finite,
-                                   .caps = object->as.cone.caps,
-                                   .only_inside = object->as.cone.only_inside};
-    revolution_flatten(flattening, TYPE_CONES, object, &given);
+    const RevolutionGiven given = revolution_given(object);
+    Revolution shape = revolution_rounded(&flattening->rounding, &given);
+    revolution_set_power(&shape, flattening, &given);
+    primitive_add(flattening, (int)object->type, &shape, object->material);
 }
 
 // Returns the bounds of the discs at the ends, which sides without caps reach.
-static Bounds frustum_bounds(Vector3 from, Vector3 axis, double radius_from, double radius_to)
+static Bounds revolution_bounds(const Object *object)
 {
-    return bounds_join(bounds_of_disc(from, axis, radius_from),
-                       bounds_of_disc(vector_add(from, axis), axis, radius_to));
+    const RevolutionGiven given = revolution_given(object);
+    if (!given.finite) return bounds_everywhere();
+    return bounds_join(bounds_of_disc(given.from, given.axis, given.base_radius),
+                       bounds_of_disc(vector_add(given.from, given.axis), given.axis, given.end_radius));
 }
 
-static Bounds cylinder_bounds(const Object *object)
-{
-    const double radius = object->as.cylinder.radius;
-    if (!object->as.cylinder.finite) return bounds_everywhere();
-    return frustum_bounds(object->as.cylinder.from, object->as.cylinder.axis, radius, radius);
-}
-
-static Bounds cone_bounds(const Object *object)
-{
-    const double *radius = object->as.cone.radius;
-    if (!object->as.cone.finite) return bounds_everywhere();
-    return frustum_bounds(object->as.cone.from, object->as.cone.axis, radius[0], radius[1]);
-}
-
-static Bounds revolution_bounds(const void *primitive)
+static Bounds revolution_primitive_bounds(const void *primitive)
 {
     const Revolution *shape = primitive;
     if (!(shape->id.y & REVOLUTION_FINITE)) return bounds_everywhere();
@@ -247,12 +229,11 @@ static void cylinder_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps cylinder_ops = {
-    .type = TYPE_CYLINDERS,
-    .bounds = cylinder_bounds,
-    .flatten = cylinder_flatten,
+    .bounds = revolution_bounds,
+    .flatten = revolution_flatten,
     .forms = {"capped cylinder", "open cylinder", "infinite cylinder"},
     .randomize = cylinder_randomize,
-    .primitive_bounds = revolution_bounds,
+    .primitive_bounds = revolution_primitive_bounds,
     .largest_coordinate = revolution_largest_coordinate,
 };
 
@@ -277,11 +258,10 @@ static void cone_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps cone_ops = {
-    .type = TYPE_CONES,
-    .bounds = cone_bounds,
-    .flatten = cone_flatten,
+    .bounds = revolution_bounds,
+    .flatten = revolution_flatten,
     .forms = {"capped cone", "open cone", "pointed cone", "infinite cone"},
     .randomize = cone_randomize,
-    .primitive_bounds = revolution_bounds,
+    .primitive_bounds = revolution_primitive_bounds,
     .largest_coordinate = revolution_largest_coordinate,
 };

@@ -72,7 +72,6 @@ static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps sphere_ops = {
-    .type = TYPE_SPHERES,
     .bounds = sphere_bounds,
     .flatten = sphere_flatten,
     .forms = {"sphere"},

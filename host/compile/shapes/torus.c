@@ -98,7 +98,6 @@ static void torus_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps torus_ops = {
-    .type = TYPE_TORI,
     .bounds = torus_bounds,
     .flatten = torus_flatten,
     .forms = {"torus", "thin torus", "fat torus", "spindle torus"},

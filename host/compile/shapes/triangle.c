@@ -246,7 +246,6 @@ static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps triangle_ops = {
-    .type = TYPE_TRIANGLES,
     .bounds = triangle_bounds,
     .flatten = triangle_flatten,
     .forms = {"triangle", "smooth triangle"},
@@ -255,7 +254,6 @@ const ShapeOps triangle_ops = {
 };
 
 const ShapeOps mesh_ops = {
-    .type = TYPE_TRIANGLES,
     .flatten = mesh_flatten,
     .primitive_bounds = instance_primitive_bounds,
 };
