@@ -20,12 +20,24 @@ typedef struct {
     TriangleNeighbors *neighbors;
 } Triangles;
 
-// Appends an instance's triangles, whose ids follow each other.
-static void instance_add(Triangles *triangles, const Mesh *mesh, const Object *object, uint32_t first_id)
+static MeshTriangle triangle_of(const Scene *scene, const Object *object, size_t part)
+{
+    if (object->type == SHAPE_MESH)
+        return mesh_triangle_at(&scene->meshes.items[object->as.mesh.index], object, part);
+    MeshTriangle triangle;
+    memcpy(triangle.vertices, object->as.triangle.vertices, sizeof triangle.vertices);
+    for (int i = 0; i < 3; i++)
+        triangle.normals[i] = vector_normalize(object->as.triangle.normals[i]);
+    return triangle;
+}
+
+// Appends the triangles of an instance, or a triangle, whose ids follow each other.
+static void separate_triangles_add(Triangles *triangles, const Object *object, uint32_t first_id)
 {
     Mesh *all = &triangles->all;
-    for (size_t i = 0; i < mesh->triangle_count; i++, all->triangle_count++) {
-        const MeshTriangle placed = mesh_triangle_at(mesh, object, i);
+    const size_t count = object_primitive_count(triangles->scene, object);
+    for (size_t i = 0; i < count; i++, all->triangle_count++) {
+        const MeshTriangle placed = triangle_of(triangles->scene, object, i);
         triangles->ids[all->triangle_count] = first_id + (uint32_t)i;
         for (int k = 0; k < 3; k++) {
             all->triangles[all->triangle_count][k] = (uint32_t)all->vertex_count;
@@ -34,8 +46,8 @@ static void instance_add(Triangles *triangles, const Mesh *mesh, const Object *o
     }
 }
 
-// Appends vertices and the triangles of them, whose ids follow each other.
-static void triangles_add(Triangles *triangles, const Mesh *mesh, uint32_t first_id)
+// Appends the vertices and triangles of a mesh that is not an instance.
+static void mesh_add(Triangles *triangles, const Mesh *mesh, uint32_t first_id)
 {
     Mesh *all = &triangles->all;
     memcpy(all->vertices + all->vertex_count, mesh->vertices, mesh->vertex_count * sizeof *mesh->vertices);
@@ -72,18 +84,10 @@ static Triangles triangles_open(const Scene *scene)
         const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
         const size_t first = triangles.all.triangle_count;
         triangles.first_ids[i] = id;
-        if (mesh && object->as.mesh.is_instance)
-            instance_add(&triangles, mesh, object, id);
-        else if (mesh)
-            triangles_add(&triangles, mesh, id);
-        if (object->type == SHAPE_TRIANGLE) {
-            Object copy = *object;
-            Mesh single = {.vertices = copy.as.triangle.vertices,
-                           .vertex_count = 3,
-                           .triangles = (uint32_t[][3]){{0, 1, 2}},
-                           .triangle_count = 1};
-            triangles_add(&triangles, &single, id);
-        }
+        if (mesh && !object->as.mesh.is_instance)
+            mesh_add(&triangles, mesh, id);
+        else if (mesh || object->type == SHAPE_TRIANGLE)
+            separate_triangles_add(&triangles, object, id);
         for (size_t k = first; k < triangles.all.triangle_count; k++)
             triangles.owners[k] = (uint32_t)i;
         id += (uint32_t)object_primitive_count(scene, object);
@@ -190,17 +194,9 @@ static Side side_of(const Triangles *triangles, const uint32_t *corners, uint32_
 
 static MeshTriangle triangle_at(const Triangles *triangles, size_t index)
 {
-    const Scene *scene = triangles->scene;
     const uint32_t owner = triangles->owners[index];
-    const Object *object = &scene->objects.items[owner];
-    if (object->type == SHAPE_MESH)
-        return mesh_triangle_at(&scene->meshes.items[object->as.mesh.index], object,
-                                triangles->ids[index] - triangles->first_ids[owner]);
-    MeshTriangle triangle;
-    memcpy(triangle.vertices, object->as.triangle.vertices, sizeof triangle.vertices);
-    for (int i = 0; i < 3; i++)
-        triangle.normals[i] = vector_normalize(object->as.triangle.normals[i]);
-    return triangle;
+    return triangle_of(triangles->scene, &triangles->scene->objects.items[owner],
+                       triangles->ids[index] - triangles->first_ids[owner]);
 }
 
 // Returns whether triangle_lift (kernels/shapes/triangle_normals.h) moves points of the neighbor, seen from
