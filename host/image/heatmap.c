@@ -47,17 +47,11 @@ bool heatmap_write(const char *path, const float *errors, uint32_t width, uint32
         .npy_type = 'f',
         .notes = (const ImageNote[]){{"Title", "heat map of errors"}, {"Scale", scale}, {NULL, NULL}},
     };
-    ImageWriter *writer = image_writer_open(path, &header, messages);
-    if (!writer) return false;
-    float *row = memory_allocate(width, 3 * sizeof *row);
-    bool written = true;
-    for (uint32_t y = 0; y < height && written; y++) {
-        for (uint32_t x = 0; x < width; x++)
-            heatmap_error_color((double)errors[(size_t)y * width + x], largest, row + 3 * (size_t)x);
-        written = image_writer_rows(writer, row, 1, messages);
-    }
-    free(row);
-    if (written) return image_writer_commit(writer, messages);
-    image_writer_abandon(writer);
-    return false;
+    const size_t count = (size_t)width * height;
+    float *colors = memory_allocate(count, 3 * sizeof *colors);
+    for (size_t i = 0; i < count; i++)
+        heatmap_error_color((double)errors[i], largest, colors + 3 * i);
+    const bool is_written = image_write(path, &header, colors, messages);
+    free(colors);
+    return is_written;
 }
