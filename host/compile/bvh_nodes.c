@@ -121,10 +121,7 @@ static Bounds node_bounds(const FlatNode *node)
 
 void bvh_refit(CompiledScene *compiled)
 {
-    uint32_t count = 0;
-    for (size_t type = 0; type < TYPE_COUNT; type++)
-        count += compiled->bvh_counts[type];
-    if (count == 0) return; // no BVH, though the kernel may be built for one
+    if (bvh_primitive_count(compiled) == 0) return; // no BVH, though the kernel may be built for one
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     compiled->changed[FLAT_NODES] = true;
     parallel_run(nodes->count, FLAT_RANGE_MIN / 16, leaves_fit, compiled);

@@ -56,6 +56,15 @@ typedef struct {
 
 void compiled_scene_free(CompiledScene *compiled); // and zeroes
 
+// Returns the number of primitives in the BVH.
+static inline uint32_t bvh_primitive_count(const CompiledScene *compiled)
+{
+    uint32_t count = 0;
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        count += compiled->bvh_counts[type];
+    return count;
+}
+
 static inline Vector3 vector3_of(const scalar4 *v)
 {
     return (Vector3){v->x, v->y, v->z};

@@ -22,10 +22,7 @@ static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, Cull
 // Returns the BVH's cull sphere, which all rays miss if the BVH is empty.
 static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack)
 {
-    uint32_t count = 0;
-    for (size_t type = 0; type < TYPE_COUNT; type++)
-        count += compiled->bvh_counts[type];
-    if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
+    if (bvh_primitive_count(compiled) == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
     return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, slack);
 }
 
