@@ -64,7 +64,7 @@ static exr_result_t candidates_add_part(CandidateList *list, exr_const_context_t
     exr_storage_t storage;
     const exr_attr_chlist_t *channels;
     exr_result_t code = exr_get_storage(context, part, &storage);
-    if (code == EXR_ERR_SUCCESS) code = exr_get_channels(context, part, &channels);
+    EXR_STEP(code, exr_get_channels(context, part, &channels));
     if (code != EXR_ERR_SUCCESS) return code;
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return EXR_ERR_SUCCESS;
     const char *part_name = NULL;

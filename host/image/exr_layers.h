@@ -5,6 +5,9 @@
 
 #include <openexr.h>
 
+// Makes a call unless an earlier one failed, and keeps the first failure.
+#define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
+
 typedef enum {
     EXR_COLORS,    // red, green, blue
     EXR_GRAY,      // luminance

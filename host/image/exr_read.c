@@ -24,7 +24,8 @@ typedef struct {
     const ImageFile *file;
     exr_context_t context;
     ExrLayer layer;
-    exr_attr_box2i_t window, display; // pixels with data; pixels of the image
+    exr_attr_box2i_t window; // pixels with data
+    int64_t left, top;       // of the image in these
     Plane planes[4];
     char problem[256];
 } ExrReader;
@@ -68,6 +69,11 @@ static uint32_t sample_count(uint32_t pixels, int sampling)
     return sampling > 0 ? (pixels + (uint32_t)sampling - 1) / (uint32_t)sampling : 0;
 }
 
+static uint64_t extent_of(int32_t min, int32_t max)
+{
+    return max < min ? 0 : (uint64_t)((int64_t)max - min + 1);
+}
+
 static uint32_t plane_count(const ExrLayer *layer)
 {
     return layer->channel_count + layer->has_alpha;
@@ -80,16 +86,15 @@ static bool planes_allocate(ExrReader *reader, Image *store)
     const ExrLayer *layer = &reader->layer;
     exr_result_t code = exr_get_channels(reader->context, layer->part, &list);
     int32_t chunk_count = 0;
-    if (code == EXR_ERR_SUCCESS) code = exr_get_chunk_count(reader->context, layer->part, &chunk_count);
+    EXR_STEP(code, exr_get_chunk_count(reader->context, layer->part, &chunk_count));
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
     if (chunk_count < 1) return image_refuse(reader->file, "EXR: the image is empty");
     // Each block has a table entry and a header; even a constant image compresses by less than 65536 to 1.
     if ((uint64_t)chunk_count > reader->file->length / 16)
         return image_refuse(reader->file, "EXR: the file is too short for its image");
-    const int64_t width = (int64_t)reader->window.max.x - reader->window.min.x + 1;
-    const int64_t height = (int64_t)reader->window.max.y - reader->window.min.y + 1;
-    if (!image_allocate(store, reader->file, width < 0 ? 0 : (uint64_t)width,
-                        height < 0 ? 0 : (uint64_t)height, plane_count(layer), 65536))
+    const exr_attr_box2i_t *window = &reader->window;
+    if (!image_allocate(store, reader->file, extent_of(window->min.x, window->max.x),
+                        extent_of(window->min.y, window->max.y), plane_count(layer), 65536))
         return false;
     for (uint32_t i = 0; i < plane_count(layer); i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[layer->channels[i]];
@@ -147,10 +152,9 @@ static exr_result_t exr_chunk(const ExrReader *reader, const exr_chunk_info_t *c
     exr_result_t code = exr_decoding_initialize(reader->context, part, chunk, &pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
     float *scratch = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *scratch);
-    code = channels_place(reader, &pipeline, scratch, x, y) ? EXR_ERR_SUCCESS : EXR_ERR_BAD_CHUNK_LEADER;
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_decoding_choose_default_routines(reader->context, part, &pipeline);
-    if (code == EXR_ERR_SUCCESS) code = exr_decoding_run(reader->context, part, &pipeline);
+    if (!channels_place(reader, &pipeline, scratch, x, y)) code = EXR_ERR_BAD_CHUNK_LEADER;
+    EXR_STEP(code, exr_decoding_choose_default_routines(reader->context, part, &pipeline));
+    EXR_STEP(code, exr_decoding_run(reader->context, part, &pipeline));
     exr_decoding_destroy(reader->context, &pipeline);
     free(scratch);
     return code;
@@ -166,7 +170,7 @@ static exr_result_t exr_scanlines(const ExrReader *reader, uint32_t height)
         exr_chunk_info_t chunk;
         int row = (int)((int64_t)reader->window.min.y + y);
         code = exr_read_scanline_chunk_info(reader->context, part, row, &chunk);
-        if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, &chunk, 0, y);
+        EXR_STEP(code, exr_chunk(reader, &chunk, 0, y));
     }
     return code;
 }
@@ -177,14 +181,13 @@ static exr_result_t exr_tiles(const ExrReader *reader, uint32_t width, uint32_t 
     int32_t tile_width, tile_height;
     exr_result_t code = exr_get_tile_sizes(reader->context, part, 0, 0, &tile_width, &tile_height);
     if (code == EXR_ERR_SUCCESS && (tile_width < 1 || tile_height < 1)) return EXR_ERR_FILE_BAD_HEADER;
-    for (uint32_t y = 0, row = 0; code == EXR_ERR_SUCCESS && y < height; y += (uint32_t)tile_height, row++) {
-        for (uint32_t x = 0, column = 0; code == EXR_ERR_SUCCESS && x < width;
-             x += (uint32_t)tile_width, column++) {
+    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < height; y += (uint32_t)tile_height)
+        for (uint32_t x = 0; code == EXR_ERR_SUCCESS && x < width; x += (uint32_t)tile_width) {
+            const int column = (int)x / tile_width, row = (int)y / tile_height;
             exr_chunk_info_t chunk;
-            code = exr_read_tile_chunk_info(reader->context, part, (int)column, (int)row, 0, 0, &chunk);
-            if (code == EXR_ERR_SUCCESS) code = exr_chunk(reader, &chunk, x, y);
+            code = exr_read_tile_chunk_info(reader->context, part, column, row, 0, 0, &chunk);
+            EXR_STEP(code, exr_chunk(reader, &chunk, x, y));
         }
-    }
     return code;
 }
 
@@ -232,19 +235,17 @@ static void integers_widen(Image *image)
 // Fills the image, which is the display window. Pixels outside the data stay 0.
 static void image_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
-    const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
-    const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
     for (uint32_t y = 0; y < image->height; y++) {
         for (uint32_t x = 0; x < image->width; x++) {
-            if (x + left < 0 || x + left >= width || y + top < 0 || y + top >= height) continue;
+            const int64_t column = x + reader->left, row = y + reader->top;
+            if (column < 0 || column >= width || row < 0 || row >= height) continue;
             float *pixel = image->values + ((size_t)y * image->width + x) * image->channels;
             for (uint32_t i = 0; i < image->channels; i++)
-                plane_sample(&reader->planes[i], (uint32_t)(x + left), (uint32_t)(y + top), &pixel[i]);
+                plane_sample(&reader->planes[i], (uint32_t)column, (uint32_t)row, &pixel[i]);
             if (reader->layer.form == EXR_CHROMA) chroma_convert(pixel);
             if (!image->alpha) continue;
             float *alpha = image->alpha + (size_t)y * image->width + x;
-            plane_sample(&reader->planes[reader->layer.channel_count], (uint32_t)(x + left),
-                         (uint32_t)(y + top), alpha);
+            plane_sample(&reader->planes[image->channels], (uint32_t)column, (uint32_t)row, alpha);
             *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1; // NaN becomes 1
         }
     }
@@ -255,9 +256,8 @@ static void alpha_open(const ExrReader *reader, Image *image, uint32_t width, ui
 {
     if (!reader->layer.has_alpha) return;
     const Plane *plane = &reader->planes[reader->layer.channel_count];
-    const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
-    const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
-    bool is_opaque = left >= 0 && top >= 0 && left + image->width <= width && top + image->height <= height;
+    bool is_opaque = reader->left >= 0 && reader->top >= 0 && reader->left + image->width <= width &&
+                     reader->top + image->height <= height;
     for (size_t i = 0; i < (size_t)width * height && is_opaque; i++)
         is_opaque = !(plane->values[i] < 1);
     if (!is_opaque)
@@ -287,9 +287,8 @@ static bool exr_decode_planes(ExrReader *reader, Image *store)
     if (!planes_allocate(reader, store)) return false;
     exr_storage_t storage;
     exr_result_t code = exr_get_storage(reader->context, reader->layer.part, &storage);
-    if (code == EXR_ERR_SUCCESS)
-        code = storage == EXR_STORAGE_TILED ? exr_tiles(reader, store->width, store->height)
-                                            : exr_scanlines(reader, store->height);
+    EXR_STEP(code, storage == EXR_STORAGE_TILED ? exr_tiles(reader, store->width, store->height)
+                                                : exr_scanlines(reader, store->height));
     return code == EXR_ERR_SUCCESS || exr_refuse(reader, code);
 }
 
@@ -297,16 +296,17 @@ static bool exr_pixels(ExrReader *reader, Image *image)
 {
     ExrLayer *layer = &reader->layer;
     if (!exr_layer_find(reader->context, reader->file, layer)) return false;
+    exr_attr_box2i_t display; // pixels of the image
     exr_result_t code = exr_get_data_window(reader->context, layer->part, &reader->window);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_get_display_window(reader->context, layer->part, &reader->display);
+    EXR_STEP(code, exr_get_display_window(reader->context, layer->part, &display));
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
-    const int64_t width = (int64_t)reader->display.max.x - reader->display.min.x + 1;
-    const int64_t height = (int64_t)reader->display.max.y - reader->display.min.y + 1;
+    reader->left = (int64_t)display.min.x - reader->window.min.x;
+    reader->top = (int64_t)display.min.y - reader->window.min.y;
     Image store = {0};
-    const bool done = exr_decode_planes(reader, &store) &&
-                      image_allocate(image, reader->file, width < 0 ? 0 : (uint64_t)width,
-                                     height < 0 ? 0 : (uint64_t)height, layer->channel_count, UINT64_MAX);
+    const bool done =
+        exr_decode_planes(reader, &store) &&
+        image_allocate(image, reader->file, extent_of(display.min.x, display.max.x),
+                       extent_of(display.min.y, display.max.y), layer->channel_count, UINT64_MAX);
     if (done) {
         image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
         alpha_open(reader, image, store.width, store.height);

@@ -1,6 +1,6 @@
 // Writes OpenEXR through the C core (Technical Introduction to OpenEXR, 2013), as 32-bit floats and integers
 // with ZIP in blocks of 16 rows.
-#include "host/image/codec.h"
+#include "host/image/exr_layers.h"
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -8,7 +8,6 @@
 #include "host/base/text.h"
 
 #include <errno.h>
-#include <openexr.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -74,9 +73,6 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
                          state->write_error ? strerror(state->write_error)
                                             : exr_get_default_error_message(code));
 }
-
-// Makes a call unless an earlier one failed, and keeps the first failure.
-#define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
 
 static void layer_add(ExrWriter *state, const ImageLayer *layer)
 {
