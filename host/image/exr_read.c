@@ -245,7 +245,8 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
             if (reader->layer.form == EXR_CHROMA) chroma_convert(pixel);
             if (!image->alpha) continue;
             float *alpha = image->alpha + (size_t)y * image->width + x;
-            plane_sample(&reader->planes[image->channels], (uint32_t)column, (uint32_t)row, alpha);
+            plane_sample(&reader->planes[reader->layer.channel_count], (uint32_t)column, (uint32_t)row,
+                         alpha);
             *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1; // NaN becomes 1
         }
     }
