@@ -1,8 +1,8 @@
 // Renders at `certified` and compares with the exact reference, for the tests of one program.
 #pragma once
 
-#include "host/compile/random_shape.h"
 #include "host/verify/certify.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 

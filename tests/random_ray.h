@@ -1,7 +1,7 @@
 // Makes random rays at random objects.
 #pragma once
 
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 
 typedef struct {
     Vector3 origin, direction;

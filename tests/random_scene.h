@@ -1,7 +1,7 @@
 // Makes random scenes of every shape, light and type of material.
 #pragma once
 
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 
 // Returns a scene, the same for the same seed, of at least 32 objects. The first are one of each form
 // (shape_forms), and none is so large that it hides the rest. The materials are plain, mirror, glass and

@@ -1,9 +1,9 @@
 // Checks that the host's arithmetic gives the same bits on every processor, since doubles are rounded after
 // each operation and functions whose values reach the flat arrays are rounded correctly. Also checks that a
 // Quad has the bits it claims.
-#include "host/compile/random_shape.h"
 #include "host/image/srgb.h"
 #include "host/scene/portable.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 
 #ifdef __x86_64__

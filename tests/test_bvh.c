@@ -2,8 +2,8 @@
 // million with GLINT_LONG_TESTS=1.
 //
 // run_tests: sanitize-long-only
-#include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"

@@ -1,7 +1,7 @@
 // Checks the BVH's invariants for any boxes.
 // run_tests: sanitize-long-only
 #include "host/compile/bvh_widen.h"
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"

@@ -1,8 +1,8 @@
 // Tests the statistic of glint bench on synthetic times: how often it reports a difference where there is
 // none, how often it finds one, and that it reports when it cannot decide. The seeds are fixed, so that each
 // run is the same.
-#include "host/compile/random_shape.h"
 #include "host/measure/comparison.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 
 static Random generator;

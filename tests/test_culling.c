@@ -2,8 +2,8 @@
 // be culled, and every sphere clearly outside it must be. The cull of several packets is tried with one ray,
 // where it bounds a single direction. test_invariances compares whole scenes with and without cull spheres.
 // run_tests: sanitize-long-only
-#include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 

@@ -2,7 +2,7 @@
 // answer. The image must have the same bits with the BVH and without it.
 //
 // run_tests: sanitize-long-only
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 

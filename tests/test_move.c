@@ -2,8 +2,8 @@
 // the other.
 // run_tests: sanitized
 #include "host/base/parallel.h"
-#include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 #include <stdatomic.h>

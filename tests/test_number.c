@@ -1,7 +1,7 @@
 // Checks that numbers of scenes are read as the nearest doubles, those of the C library, however they are
 // written.
-#include "host/compile/random_shape.h"
 #include "host/import/number.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 
 static void check(const char *text)

@@ -2,7 +2,7 @@
 // permits must be repaired to the correctly rounded ones. The fma of devices without one in hardware must
 // have fma's bits.
 // run_tests: sanitize-long-only
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 

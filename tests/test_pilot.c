@@ -1,7 +1,7 @@
 // Tests the sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it
 // chooses.
-#include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

@@ -1,6 +1,6 @@
 // Feeds randomly damaged files to the readers of tests/fuzz/readers.c in a sanitized build. tools/fuzz
 // generates inputs guided by coverage. run_tests: sanitized
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/child.h"
 #include "tests/film.h"

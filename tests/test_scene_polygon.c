@@ -1,6 +1,6 @@
 // Cuts polygons into triangles. Every point of the polygon must lie in exactly one, whatever its form.
-#include "host/compile/random_shape.h"
 #include "host/scene/polygon.h"
+#include "host/verify/random_shape.h"
 #include "tests/check.h"
 
 typedef ARRAY_OF(Vector3) Outline;

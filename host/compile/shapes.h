@@ -3,14 +3,11 @@
 
 #include "host/compile/compiled_scene.h"
 #include "host/compile/flatten.h"
-#include "host/compile/random_shape.h"
 
 typedef struct {
     Vector3 center;
     double radius; // infinite for an unbounded one
 } BoundingSphere;
-
-enum { SHAPE_OPS_FORMS = 4 };
 
 // An Object is the scene's, in double and in world coordinates; a primitive is the flat struct of
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
@@ -19,12 +16,6 @@ typedef struct {
     Bounds (*bounds)(const Object *object);
     // Adds the primitive that flattening->part selects (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
-
-    // The names of its random forms, up to the first NULL.
-    const char *forms[SHAPE_OPS_FORMS];
-    // Sets made->object's shape to a random one of a form, of about made->radius around made->center, along
-    // made->axis if it has an axis or normal. Updates the radius and the axis if it chooses others.
-    void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
     // Returns the bounds of a primitive. NULL means always unbounded.
     Bounds (*primitive_bounds)(const void *primitive);

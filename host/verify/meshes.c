@@ -1,9 +1,9 @@
 // Checks of triangles and of the BVH that are not in the tables.
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/compile/random_shape.h"
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
+#include "host/verify/random_shape.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 // the objects that occlude them.
 #pragma once
 
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_color.h"
 
 // The largest distance of a computed point from its surface, relative to the numbers it was computed from.

@@ -8,8 +8,8 @@
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/base/ulp.h"
-#include "host/compile/random_shape.h"
 #include "host/render/renderer.h"
+#include "host/verify/random_shape.h"
 #include "host/verify/reference.h"
 #include "tests/random_ray.h"
 #include <getopt.h>

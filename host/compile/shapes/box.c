@@ -18,21 +18,8 @@ static Bounds box_primitive_bounds(const void *primitive)
     return (Bounds){vector3_of(&box->low), vector3_of(&box->high)};
 }
 
-static void box_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    (void)form;
-    Vector3 half = {random_between(random, 0.2, 1), random_between(random, 0.2, 1),
-                    random_between(random, 0.2, 1)};
-    half = vector_scale(half, made->radius);
-    made->object.as.box.min = vector_subtract(made->center, half);
-    made->object.as.box.max = vector_add(made->center, half);
-    made->radius = vector_length(half);
-}
-
 const ShapeOps box_ops = {
     .bounds = box_bounds,
     .flatten = box_flatten,
-    .forms = {"box"},
-    .randomize = box_randomize,
     .primitive_bounds = box_primitive_bounds,
 };

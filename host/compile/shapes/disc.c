@@ -60,19 +60,9 @@ static void disc_plane(const void *primitive, Vector3 *point, Vector3 *normal)
     *normal = vector3_of(&disc->normal);
 }
 
-static void disc_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    (void)form, (void)random;
-    made->object.as.disc.center = made->center;
-    made->object.as.disc.normal = made->axis;
-    made->object.as.disc.radius = made->radius;
-}
-
 const ShapeOps disc_ops = {
     .bounds = disc_bounds,
     .flatten = disc_flatten,
-    .forms = {"disc"},
-    .randomize = disc_randomize,
     .primitive_bounds = disc_primitive_bounds,
     .bounding_sphere = disc_bounding_sphere,
     .plane = disc_plane,

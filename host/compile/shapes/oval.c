@@ -82,7 +82,6 @@ static double oval_largest_coordinate(const void *primitive)
     return vector_largest((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}) + oval->sizes.x;
 }
 
-// Lacks random shapes; tests/test_ovals.c transforms others.
 const ShapeOps oval_ops = {
     .bounds = oval_bounds,
     .flatten = oval_flatten,

@@ -24,17 +24,8 @@ static double plane_largest_coordinate(const void *primitive)
     return fabs(vector_dot(vector_normalize(vector3_of(&plane->normal)), vector3_of(&plane->point)));
 }
 
-static void plane_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    (void)form, (void)random;
-    made->object.as.plane.point = made->center;
-    made->object.as.plane.normal = made->axis;
-}
-
 const ShapeOps plane_ops = {
     .flatten = plane_flatten,
-    .forms = {"plane"},
-    .randomize = plane_randomize,
     .plane = plane_plane,
     .largest_coordinate = plane_largest_coordinate,
 };

@@ -64,18 +64,9 @@ static Bounds sphere_primitive_bounds(const void *primitive)
     return bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
 }
 
-static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    (void)form, (void)random;
-    made->object.as.sphere.center = made->center;
-    made->object.as.sphere.radius = made->radius;
-}
-
 const ShapeOps sphere_ops = {
     .bounds = sphere_bounds,
     .flatten = sphere_flatten,
-    .forms = {"sphere"},
-    .randomize = sphere_randomize,
     .primitive_bounds = sphere_primitive_bounds,
     .bounding_sphere = sphere_bounding_sphere,
 };

@@ -78,30 +78,9 @@ static BoundingSphere torus_bounding_sphere(const void *primitive)
     return (BoundingSphere){vector3_of(&torus->center_major), torus->center_major.w + torus->axis_minor.w};
 }
 
-enum { TORUS, TORUS_THIN, TORUS_FAT, TORUS_SPINDLE };
-
-// Makes a random torus, aligned with a world axis in half of the cases. The tube of a spindle torus is wider
-// than its circle, so it has no hole.
-static void torus_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    const double major = made->radius;
-    double minor = major * random_between(random, 0.1, 0.6);
-    if (form == TORUS_THIN) minor = major * 0.01;
-    if (form == TORUS_FAT) minor = major * 0.9;
-    if (form == TORUS_SPINDLE) minor = major * random_between(random, 1.1, 3);
-    made->axis = random_coin(random) ? random_world_axis(random) : vector_on_grid(random_unit_vector(random));
-    made->object.as.torus.center = made->center;
-    made->object.as.torus.axis = made->axis;
-    made->object.as.torus.major = major;
-    made->object.as.torus.minor = minor;
-    made->radius = major + minor;
-}
-
 const ShapeOps torus_ops = {
     .bounds = torus_bounds,
     .flatten = torus_flatten,
-    .forms = {"torus", "thin torus", "fat torus", "spindle torus"},
-    .randomize = torus_randomize,
     .primitive_bounds = torus_primitive_bounds,
     .bounding_sphere = torus_bounding_sphere,
 };

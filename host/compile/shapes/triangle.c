@@ -230,26 +230,9 @@ static Bounds triangle_primitive_bounds(const void *primitive)
     return bounds_of_triangle(vector3_of(&triangle->a), vector3_of(&triangle->b), vector3_of(&triangle->c));
 }
 
-enum { TRIANGLE_FLAT, TRIANGLE_SMOOTH };
-
-static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
-{
-    Vector3 *vertices = made->object.as.triangle.vertices, *normals = made->object.as.triangle.normals;
-    for (int i = 0; i < 3; i++)
-        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->radius));
-    made->axis = vector_subtract(vertices[1], vertices[0]);
-    if (form != TRIANGLE_SMOOTH) return;
-    Vector3 normal = vector_normalize(vector_cross(made->axis, vector_subtract(vertices[2], vertices[0])));
-    made->object.as.triangle.smooth = true;
-    for (int i = 0; i < 3; i++)
-        normals[i] = vector_add(normal, vector_scale(random_in_sphere(random), 0.5));
-}
-
 const ShapeOps triangle_ops = {
     .bounds = triangle_bounds,
     .flatten = triangle_flatten,
-    .forms = {"triangle", "smooth triangle"},
-    .randomize = triangle_randomize,
     .primitive_bounds = triangle_primitive_bounds,
 };
 

@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
@@ -48,3 +49,16 @@ static void surface_box(const Object *object, Quad3 point, ReferenceSurface *sur
 }
 
 const ReferenceShape reference_box = {hit_box, surface_box, 2, 6};
+
+static void box_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form;
+    Vector3 half = {random_between(random, 0.2, 1), random_between(random, 0.2, 1),
+                    random_between(random, 0.2, 1)};
+    half = vector_scale(half, made->radius);
+    made->object.as.box.min = vector_subtract(made->center, half);
+    made->object.as.box.max = vector_add(made->center, half);
+    made->radius = vector_length(half);
+}
+
+const RandomForms box_forms = {{"box"}, box_randomize};

@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 // Twice the distance from the rim, within the plane, is about (d^2 / r^2 - 1) r. Between the ray's line and
@@ -34,3 +35,13 @@ static void surface_disc(const Object *object, Quad3 point, ReferenceSurface *su
 }
 
 const ReferenceShape reference_disc = {hit_disc, surface_disc, 1, 7};
+
+static void disc_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form, (void)random;
+    made->object.as.disc.center = made->center;
+    made->object.as.disc.normal = made->axis;
+    made->object.as.disc.radius = made->radius;
+}
+
+const RandomForms disc_forms = {{"disc"}, disc_randomize};

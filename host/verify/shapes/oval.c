@@ -1,4 +1,5 @@
 #include "host/scene/oval.h"
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 extern const ReferenceShape reference_sphere, reference_disc, reference_cylinder, reference_cone,
@@ -82,3 +83,6 @@ static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *su
 }
 
 const ReferenceShape reference_oval = {hit_oval, surface_oval, 1, 16};
+
+// Lacks random shapes; tests/test_ovals.c transforms others.
+const RandomForms oval_forms = {{NULL}, NULL};

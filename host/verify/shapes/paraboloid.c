@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 static void hit_paraboloid(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
@@ -57,3 +58,24 @@ static void surface_paraboloid(const Object *object, Quad3 point, ReferenceSurfa
 }
 
 const ReferenceShape reference_paraboloid = {hit_paraboloid, surface_paraboloid, 1, 8};
+
+enum { PARABOLOID_CAPPED, PARABOLOID_OPEN, PARABOLOID_INFINITE };
+
+// Makes a random paraboloid whose rim is from a fifth to twice as wide as it is high.
+static void paraboloid_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    double height = made->radius * random_between(random, 0.5, 3);
+    double rim = height * random_between(random, 0.1, 1);
+    made->axis = random_coin(random) ? random_world_axis(random) : vector_on_grid(random_unit_vector(random));
+    Vector3 to_center = vector_scale(vector_normalize(made->axis), height / 2);
+    made->object.as.paraboloid.apex = vector_subtract(made->center, to_center);
+    made->object.as.paraboloid.axis = made->axis;
+    made->object.as.paraboloid.focal_length = rim * rim / (4 * height);
+    made->object.as.paraboloid.height = height;
+    made->object.as.paraboloid.finite = form != PARABOLOID_INFINITE;
+    made->object.as.paraboloid.caps = form == PARABOLOID_CAPPED;
+    made->radius = hypotenuse(height / 2, rim);
+}
+
+const RandomForms paraboloid_forms = {{"capped paraboloid", "open paraboloid", "infinite paraboloid"},
+                                      paraboloid_randomize};

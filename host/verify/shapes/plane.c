@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 static void hit_plane(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
@@ -21,3 +22,12 @@ static void surface_plane(const Object *object, Quad3 point, ReferenceSurface *s
 }
 
 const ReferenceShape reference_plane = {hit_plane, surface_plane, 1, 6};
+
+static void plane_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form, (void)random;
+    made->object.as.plane.point = made->center;
+    made->object.as.plane.normal = made->axis;
+}
+
+const RandomForms plane_forms = {{"plane"}, plane_randomize};

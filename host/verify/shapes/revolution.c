@@ -1,4 +1,5 @@
 // Cylinders and cones.
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 #include <math.h>
@@ -127,3 +128,53 @@ static void surface_revolution(const Object *object, Quad3 point, ReferenceSurfa
 const ReferenceShape reference_cylinder = {hit_revolution, surface_revolution, 1, 7};
 
 const ReferenceShape reference_cone = {hit_revolution, surface_revolution, 1, 9};
+
+// Chooses a random axis and the two radii at its ends. Returns where the axis starts.
+static Vector3 random_axis(RandomShape *made, double radii[2], Random *random)
+{
+    double size = made->radius, length = size * random_between(random, 0.5, 3);
+    radii[0] = size * random_between(random, 0.2, 1);
+    radii[1] = size * random_between(random, 0.2, 1);
+    made->axis = vector_on_grid(vector_scale(random_unit_vector(random), length));
+    made->radius = hypotenuse(length / 2, fmax(radii[0], radii[1]));
+    return vector_on_grid(vector_subtract(made->center, vector_scale(made->axis, 0.5)));
+}
+
+enum { CYLINDER_CAPPED, CYLINDER_OPEN, CYLINDER_INFINITE };
+
+static void cylinder_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    double radii[2];
+    Vector3 from = random_axis(made, radii, random);
+    made->object.as.cylinder.from = from;
+    made->object.as.cylinder.axis = made->axis;
+    made->object.as.cylinder.radius = radii[0];
+    made->object.as.cylinder.finite = form != CYLINDER_INFINITE;
+    made->object.as.cylinder.caps = form == CYLINDER_CAPPED;
+}
+
+const RandomForms cylinder_forms = {{"capped cylinder", "open cylinder", "infinite cylinder"},
+                                    cylinder_randomize};
+
+enum { CONE_CAPPED, CONE_OPEN, CONE_POINTED, CONE_INFINITE };
+
+static void cone_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    double radii[2];
+    Vector3 from = random_axis(made, radii, random);
+    if (form == CONE_POINTED) radii[random_coin(random) ? 0 : 1] = 0;
+    made->object.as.cone.from = from;
+    made->object.as.cone.axis = made->axis;
+    if (form == CONE_INFINITE) {
+        made->object.as.cone.from = vector_on_grid(made->center);
+        made->object.as.cone.slope = random_between(random, 0.1, 3);
+        return;
+    }
+    made->object.as.cone.radius[0] = radii[0];
+    made->object.as.cone.radius[1] = radii[1];
+    made->object.as.cone.finite = true;
+    made->object.as.cone.caps = form != CONE_OPEN;
+}
+
+const RandomForms cone_forms = {{"capped cone", "open cone", "pointed cone", "infinite cone"},
+                                cone_randomize};

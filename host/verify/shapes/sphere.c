@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 static void hit_sphere(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
@@ -28,3 +29,12 @@ static void surface_sphere(const Object *object, Quad3 point, ReferenceSurface *
 }
 
 const ReferenceShape reference_sphere = {hit_sphere, surface_sphere, 1, 4};
+
+static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    (void)form, (void)random;
+    made->object.as.sphere.center = made->center;
+    made->object.as.sphere.radius = made->radius;
+}
+
+const RandomForms sphere_forms = {{"sphere"}, sphere_randomize};

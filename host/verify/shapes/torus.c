@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 #include <math.h>
@@ -128,3 +129,24 @@ static void surface_torus(const Object *object, Quad3 point, ReferenceSurface *s
 }
 
 const ReferenceShape reference_torus = {hit_torus, surface_torus, 1, 8};
+
+enum { TORUS, TORUS_THIN, TORUS_FAT, TORUS_SPINDLE };
+
+// Makes a random torus, aligned with a world axis in half of the cases. The tube of a spindle torus is wider
+// than its circle, so it has no hole.
+static void torus_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    const double major = made->radius;
+    double minor = major * random_between(random, 0.1, 0.6);
+    if (form == TORUS_THIN) minor = major * 0.01;
+    if (form == TORUS_FAT) minor = major * 0.9;
+    if (form == TORUS_SPINDLE) minor = major * random_between(random, 1.1, 3);
+    made->axis = random_coin(random) ? random_world_axis(random) : vector_on_grid(random_unit_vector(random));
+    made->object.as.torus.center = made->center;
+    made->object.as.torus.axis = made->axis;
+    made->object.as.torus.major = major;
+    made->object.as.torus.minor = minor;
+    made->radius = major + minor;
+}
+
+const RandomForms torus_forms = {{"torus", "thin torus", "fat torus", "spindle torus"}, torus_randomize};

@@ -1,3 +1,4 @@
+#include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
 #include <math.h>
@@ -79,3 +80,20 @@ static void surface_triangle(const Object *object, Quad3 point, ReferenceSurface
 }
 
 const ReferenceShape reference_triangle = {hit_triangle, surface_triangle, 3, 18};
+
+enum { TRIANGLE_FLAT, TRIANGLE_SMOOTH };
+
+static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
+{
+    Vector3 *vertices = made->object.as.triangle.vertices, *normals = made->object.as.triangle.normals;
+    for (int i = 0; i < 3; i++)
+        vertices[i] = vector_add(made->center, vector_scale(random_unit_vector(random), made->radius));
+    made->axis = vector_subtract(vertices[1], vertices[0]);
+    if (form != TRIANGLE_SMOOTH) return;
+    Vector3 normal = vector_normalize(vector_cross(made->axis, vector_subtract(vertices[2], vertices[0])));
+    made->object.as.triangle.smooth = true;
+    for (int i = 0; i < 3; i++)
+        normals[i] = vector_add(normal, vector_scale(random_in_sphere(random), 0.5));
+}
+
+const RandomForms triangle_forms = {{"triangle", "smooth triangle"}, triangle_randomize};

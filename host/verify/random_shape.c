@@ -1,7 +1,14 @@
-#include "host/compile/random_shape.h"
+#include "host/verify/random_shape.h"
 
 #include "host/base/fault.h"
 #include "host/compile/shapes.h"
+
+#define FORMS_DECLARE(feature, Type, name, names) extern const RandomForms name##_forms;
+SHAPE_LIST(FORMS_DECLARE)
+
+// Indexed by ShapeType, which follows SHAPE_LIST.
+#define FORMS_ROW(feature, Type, name, names) &name##_forms,
+static const RandomForms *const shapes[SHAPE_MESH] = {SHAPE_LIST(FORMS_ROW)};
 
 // SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
 uint64_t random_bits(Random *random)
@@ -61,11 +68,11 @@ size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX])
 {
     size_t count = 0;
     for (ShapeType type = 0; type < SHAPE_MESH; type++) {
-        const ShapeOps *shape = shape_ops[type];
-        for (unsigned form = 0; form < SHAPE_OPS_FORMS && shape->forms[form]; form++) {
+        const char *const *names = shapes[type]->names;
+        for (unsigned form = 0; form < FORMS_OF_SHAPE_MAX && names[form]; form++) {
             if (count == SHAPE_FORMS_MAX) fault("more than %d forms of shapes", SHAPE_FORMS_MAX);
             ShapeForm *entry = &forms[count++];
-            *entry = (ShapeForm){type, form, shape->forms[form], false};
+            *entry = (ShapeForm){type, form, names[form], false};
             const RandomShape one = random_shape(entry, &(Random){0});
             const Bounds bounds = object_bounds(NULL, &one.object);
             entry->bounded = !bounds_is_everywhere(&bounds);
@@ -78,7 +85,7 @@ static RandomShape shape_make(const ShapeForm *form, Vector3 center, double size
                               Random *random)
 {
     RandomShape made = {.object.type = form->type, .center = center, .radius = size, .axis = axis};
-    shape_ops[form->type]->randomize(&made, form->form, random);
+    shapes[form->type]->randomize(&made, form->form, random);
     return made;
 }
 

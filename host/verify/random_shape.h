@@ -27,6 +27,16 @@ typedef struct {
     Vector3 axis;  // along which rays are special: an axis, a normal, an edge; not unit
 } RandomShape;
 
+enum { FORMS_OF_SHAPE_MAX = 4 };
+
+// The random forms of a shape. The files of shapes/ have a row for each shape.
+typedef struct {
+    const char *names[FORMS_OF_SHAPE_MAX]; // up to the first NULL
+    // Sets made->object's shape to a random one of a form, of about made->radius around made->center, along
+    // made->axis if it has an axis or normal. Updates the radius and the axis if it chooses others.
+    void (*randomize)(RandomShape *made, unsigned form, Random *random);
+} RandomForms;
+
 // A form of a shape, such as "open cylinder".
 typedef struct {
     ShapeType type;
