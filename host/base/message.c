@@ -42,34 +42,26 @@ static size_t character_count(const char *bytes, size_t length)
     return count;
 }
 
-static char *message_format(const char *format, va_list arguments)
+// Adds the message with a text, which is freed after its copy is made printable.
+static void message_push(MessageList *list, Message message, char *formatted)
 {
-    char *formatted = text_format_list(format, arguments);
-    char *text = printable_copy(formatted, strlen(formatted), SIZE_MAX, false);
+    message.text = printable_copy(formatted, strlen(formatted), SIZE_MAX, false);
     free(formatted);
-    return text;
-}
-
-static void message_add(MessageList *list, MessageSeverity severity, const char *format, va_list arguments)
-{
-    Message message = {.severity = severity, .text = message_format(format, arguments)};
     array_push(*list, message);
 }
 
 void message_warning(MessageList *list, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    message_add(list, MESSAGE_WARNING, format, arguments);
-    va_end(arguments);
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
+    message_push(list, (Message){.severity = MESSAGE_WARNING}, formatted);
 }
 
 bool message_error(MessageList *list, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    message_add(list, MESSAGE_ERROR, format, arguments);
-    va_end(arguments);
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
+    message_push(list, (Message){.severity = MESSAGE_ERROR}, formatted);
     return false;
 }
 
@@ -119,11 +111,9 @@ void message_add_at(MessageList *list, MessageSeverity severity, const Source *s
 {
     Message message = message_place(source, offset);
     message.severity = severity;
-    va_list arguments;
-    va_start(arguments, format);
-    message.text = message_format(format, arguments);
-    va_end(arguments);
-    array_push(*list, message);
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
+    message_push(list, message, formatted);
 }
 
 void message_free(Message *message)
