@@ -75,37 +75,35 @@ static void profile_check(const ImageFile *file)
         image_warn(file, "JPEG: the color profile is ignored; the colors are taken for sRGB");
 }
 
+static bool jpeg_pixels(tjhandle decoder, Image *image, const ImageFile *file)
+{
+    int width, height, sampling, color_space;
+    if (tjDecompressHeader3(decoder, file->bytes, file->length, &width, &height, &sampling, &color_space))
+        return image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
+    if (color_space == TJCS_CMYK || color_space == TJCS_YCCK)
+        return image_refuse(file, "JPEG: CMYK colors are not supported; convert the image to RGB");
+    if (!image_allocate(image, file, (uint64_t)width, (uint64_t)height, 3, JPEG_EXPANSION)) return false;
+    const size_t count = (size_t)image->width * image->height * 3;
+    uint8_t *bytes = calloc(count, 1);
+    if (!bytes) return image_refuse(file, "the image does not fit into memory");
+    const bool is_read = tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
+                                       TJFLAG_ACCURATEDCT) == 0;
+    for (size_t i = 0; i < count; i++)
+        image->values[i] = (float)bytes[i] / 255.0F;
+    free(bytes);
+    return is_read || image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
+}
+
 bool jpeg_decode(Image *image, const ImageFile *file)
 {
     tjhandle decoder = tjInitDecompress();
     if (!decoder) return image_refuse(file, "JPEG: %s", tjGetErrorStr());
-    int width, height, sampling, color_space;
-    uint8_t *bytes = NULL;
-    bool done = false;
-    if (tjDecompressHeader3(decoder, file->bytes, file->length, &width, &height, &sampling, &color_space) !=
-        0) {
-        image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
-    } else if (color_space == TJCS_CMYK || color_space == TJCS_YCCK) {
-        image_refuse(file, "JPEG: CMYK colors are not supported; convert the image to RGB");
-    } else if (image_allocate(image, file, (uint64_t)width, (uint64_t)height, 3, JPEG_EXPANSION)) {
-        size_t count = (size_t)image->width * image->height * 3;
-        bytes = calloc(count, 1);
-        if (!bytes)
-            image_refuse(file, "the image does not fit into memory");
-        else if (tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
-                               TJFLAG_ACCURATEDCT) != 0)
-            image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
-        else {
-            for (size_t i = 0; i < count; i++)
-                image->values[i] = (float)bytes[i] / 255.0F;
-            image_orient(image, orientation_of(file));
-            profile_check(file);
-            done = true;
-        }
-    }
+    const bool done = jpeg_pixels(decoder, image, file);
+    tjDestroy(decoder);
+    if (!done) return false;
+    image_orient(image, orientation_of(file));
+    profile_check(file);
     image->display = true;
     image->transfer = TRANSFER_SRGB;
-    free(bytes);
-    tjDestroy(decoder);
-    return done;
+    return true;
 }
