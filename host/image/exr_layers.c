@@ -117,12 +117,6 @@ static ExrLayer layer_of(const Candidate *candidate)
     return layer;
 }
 
-static const char *shown_name(const Candidate *candidate, int *length)
-{
-    *length = candidate->length > 0 ? (int)candidate->length : 7;
-    return candidate->length > 0 ? candidate->name : "default";
-}
-
 // Bounds the bytes of names that a message shows.
 enum { NAMES_SHOWN = 200 };
 
@@ -155,11 +149,13 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
 {
     Text names = {0};
     for (size_t i = 0; i < list->count; i++) {
-        const ExrForm form = layer_of(&list->items[i]).form;
+        const Candidate *candidate = &list->items[i];
+        const ExrForm form = layer_of(candidate).form;
         if (form == EXR_OTHER || has_light(form) != with_light) continue;
-        int length;
-        const char *name = shown_name(&list->items[i], &length);
-        names_add(&names, name, (size_t)length);
+        if (candidate->length > 0)
+            names_add(&names, candidate->name, candidate->length);
+        else
+            names_add(&names, "default", strlen("default"));
     }
     image_refuse(file, "EXR: several layers, %s; name one", text_c(&names));
     text_free(&names);
