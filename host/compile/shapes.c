@@ -22,7 +22,10 @@ Bounds object_bounds(const Scene *scene, const Object *object)
 Bounds primitive_bounds(size_t type, const void *primitive)
 {
     const ShapeOps *shape = shape_ops[type];
-    return shape->primitive_bounds ? shape->primitive_bounds(primitive) : bounds_everywhere();
+    if (shape->primitive_bounds) return shape->primitive_bounds(primitive);
+    if (!shape->bounding_sphere) return bounds_everywhere();
+    const BoundingSphere sphere = shape->bounding_sphere(primitive);
+    return bounds_around(sphere.center, vector_all(sphere.radius));
 }
 
 BoundingSphere box_bounding_sphere(const Bounds *box)

@@ -17,7 +17,8 @@ typedef struct {
     // Adds the primitive that flattening->part selects (host/compile/flatten.h).
     void (*flatten)(Flattening *flattening, const Object *object);
 
-    // Returns the bounds of a primitive. NULL means always unbounded.
+    // Returns the bounds of a primitive. NULL means those of bounding_sphere or, without one, always
+    // unbounded.
     Bounds (*primitive_bounds)(const void *primitive);
     // Returns the bounding sphere. NULL means that of primitive_bounds.
     BoundingSphere (*bounding_sphere)(const void *primitive);

@@ -39,18 +39,11 @@ static void disc_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_DISCS, &disc, object->material);
 }
 
+// The disc's box is that of the sphere, because t is uncertain by as much for rays nearly in its plane.
 static BoundingSphere disc_bounding_sphere(const void *primitive)
 {
     const Disc *disc = primitive;
     return (BoundingSphere){vector3_of(&disc->center_radius), disc->center_radius.w};
-}
-
-// Returns the bounding sphere's bounds, because t is uncertain by as much for rays nearly in the disc's
-// plane.
-static Bounds disc_primitive_bounds(const void *primitive)
-{
-    const Disc *disc = primitive;
-    return bounds_around(vector3_of(&disc->center_radius), vector_all(disc->center_radius.w));
 }
 
 static void disc_plane(const void *primitive, Vector3 *point, Vector3 *normal)
@@ -63,7 +56,6 @@ static void disc_plane(const void *primitive, Vector3 *point, Vector3 *normal)
 const ShapeOps disc_ops = {
     .bounds = disc_bounds,
     .flatten = disc_flatten,
-    .primitive_bounds = disc_primitive_bounds,
     .bounding_sphere = disc_bounding_sphere,
     .plane = disc_plane,
 };

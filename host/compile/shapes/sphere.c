@@ -58,15 +58,8 @@ static BoundingSphere sphere_bounding_sphere(const void *primitive)
     return (BoundingSphere){vector3_of(&sphere->center_radius), sphere->center_radius.w};
 }
 
-static Bounds sphere_primitive_bounds(const void *primitive)
-{
-    const Sphere *sphere = primitive;
-    return bounds_around(vector3_of(&sphere->center_radius), vector_all(sphere->center_radius.w));
-}
-
 const ShapeOps sphere_ops = {
     .bounds = sphere_bounds,
     .flatten = sphere_flatten,
-    .primitive_bounds = sphere_primitive_bounds,
     .bounding_sphere = sphere_bounding_sphere,
 };
