@@ -1,4 +1,4 @@
-#include "host/base/memory.h"
+#include "host/base/array.h"
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
@@ -26,10 +26,7 @@ typedef struct {
     double largest_coordinate; // magnitude of its numbers, relative to the origin, mostly the eye
 } ContactRegion;
 
-typedef struct {
-    ContactRegion *items;
-    size_t count;
-} ContactRegionList;
+typedef ARRAY_OF(ContactRegion) ContactRegionList;
 
 static ContactRegion region_of(size_t type, const void *primitive)
 {
@@ -102,8 +99,7 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
 {
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     const FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
-    *list = (ContactRegionList){
-        .items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count, sizeof(ContactRegion))};
+    *list = (ContactRegionList){0};
     double largest = 0;
     for (size_t type = 0; type < TYPE_COUNT; type++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
@@ -115,8 +111,9 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
             if (type == TYPE_INSTANCES ? !instance_has(compiled, primitive, is_transparent, transparent)
                                        : transparent != is_transparent)
                 continue;
-            list->items[list->count] = region_of(type, flat_array_at(array, i));
-            largest = fmax(largest, list->items[list->count++].largest_coordinate);
+            const ContactRegion region = region_of(type, primitive);
+            array_push(*list, region);
+            largest = fmax(largest, region.largest_coordinate);
         }
     }
     return largest;
