@@ -204,16 +204,11 @@ static double revolution_largest_coordinate(const void *primitive)
     return vector_largest(vector3_of(&shape->base_radius)) + fabs(shape->base_radius.w) / shape->range.y;
 }
 
-const ShapeOps cylinder_ops = {
-    .bounds = revolution_bounds,
-    .flatten = revolution_flatten,
-    .primitive_bounds = revolution_primitive_bounds,
-    .largest_coordinate = revolution_largest_coordinate,
-};
+#define REVOLUTION_OPS                                                                                       \
+    {                                                                                                        \
+        .bounds = revolution_bounds, .flatten = revolution_flatten,                                          \
+        .primitive_bounds = revolution_primitive_bounds,                                                     \
+        .largest_coordinate = revolution_largest_coordinate,                                                 \
+    }
 
-const ShapeOps cone_ops = {
-    .bounds = revolution_bounds,
-    .flatten = revolution_flatten,
-    .primitive_bounds = revolution_primitive_bounds,
-    .largest_coordinate = revolution_largest_coordinate,
-};
+const ShapeOps cylinder_ops = REVOLUTION_OPS, cone_ops = REVOLUTION_OPS;
