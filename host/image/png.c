@@ -150,6 +150,7 @@ typedef struct {
     PngState state;
     const ImageFile *file;
     size_t at;
+    int passes; // over all rows: 7 if they are interlaced
 } PngReader;
 
 static void png_read_bytes(png_structp png, png_bytep bytes, size_t size)
@@ -178,7 +179,7 @@ static bool png_prepare(PngReader *reader, Image *image)
     else if (png_get_bit_depth(png, info) < 8)
         png_set_expand_gray_1_2_4_to_8(png);
     if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
-    png_set_interlace_handling(png);
+    reader->passes = png_set_interlace_handling(png);
 
     // A byte holds at most 8 palette pixels. Checked before libpng allocates a row of the declared width.
     if (!image_allocate(image, reader->file, png_get_image_width(png, info), png_get_image_height(png, info),
@@ -222,13 +223,9 @@ static bool png_read_all(PngReader *reader, Image *image)
     if (setjmp(png_jmpbuf(png))) return image_refuse(reader->file, "PNG: %s", reader->state.problem);
     if (!png_prepare(reader, image)) return false;
     size_t row_size = png_get_rowbytes(png, reader->state.info);
-    int passes = png_get_interlace_type(png, reader->state.info) == PNG_INTERLACE_ADAM7
-                     ? PNG_INTERLACE_ADAM7_PASSES
-                     : 1;
-    for (int pass = 0; pass < passes; pass++) {
+    for (int pass = 0; pass < reader->passes; pass++)
         for (uint32_t row = 0; row < image->height; row++)
             png_read_row(png, reader->state.bytes + row * row_size, NULL);
-    }
     png_read_end(png, NULL);
     return true;
 }
