@@ -15,14 +15,3 @@ Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)
     }
     return all;
 }
-
-double scene_smallest_size(const Scene *scene)
-{
-    double smallest = INFINITY;
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
-        double largest_side = vector_largest(vector_subtract(bounds.max, bounds.min));
-        if (largest_side > 0) smallest = fmin(smallest, largest_side);
-    }
-    return isinf(smallest) ? 0 : smallest;
-}

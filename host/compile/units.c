@@ -1,10 +1,23 @@
 #include "host/compile/scene_bounds.h"
+#include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <stdlib.h>
 
 static double distance_largest(Vector3 from, Vector3 to)
 {
     return vector_largest(vector_subtract(to, from));
+}
+
+// Returns the largest side of the smallest bounded object's box, or 0 if none has any size.
+static double smallest_size(const Scene *scene)
+{
+    double smallest = INFINITY;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
+        double largest_side = vector_largest(vector_subtract(bounds.max, bounds.min));
+        if (largest_side > 0) smallest = fmin(smallest, largest_side); // infinite if unbounded
+    }
+    return isinf(smallest) ? 0 : smallest;
 }
 
 // In float a torus of 1e12 units, or of 1e-12, is lost, because the third and fourth powers of lengths
@@ -22,7 +35,7 @@ double scene_unit(const Scene *scene, const CompileSettings *settings)
     int farthest, smallest;
     frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
     if (abs(farthest) <= harmless) return 1;
-    frexp(scene_smallest_size(scene), &smallest);
+    frexp(smallest_size(scene), &smallest);
     int middle = (farthest + smallest) / 2;
     return farthest > 0 && middle < 0 ? 1 : ldexp(1, middle);
 }
