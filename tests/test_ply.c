@@ -242,11 +242,15 @@ TEST(binary_file_cut_short_is_refused)
 {
     OwnedText whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
     assert_square(&whole);
-    for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
+    const size_t header_size = strlen(BINARY("uchar"));
+    char *no_body = text_format("byte %zu: vertex 0 (from 0) lacks its 'x'", header_size);
+    for (size_t size = header_size; size < whole.count; size++) {
         file_write_bytes("a.ply", whole.items, size);
         OwnedText messages = scene_messages("scene.yaml", SCENE, false);
         assert_non_null(strstr(text_c(&messages), "4:18: error: a.ply: byte "));
+        if (size == header_size) assert_non_null(strstr(text_c(&messages), no_body));
     }
+    free(no_body);
 }
 
 static Scene scene_of_ply(const char *ply, const char *expected)

@@ -22,15 +22,15 @@ typedef struct {
 enum { POSITION, LOOK_AT, INTENSITY, RADIUS, ANGLE, CENTER, NORMAL, COLOR, DIFFUSE, SPECULAR, KEY_COUNT };
 
 static const LineField keys[KEY_COUNT] = {
-    [POSITION] = {"position", line_blank_vector, offsetof(BlockValues, position), NULL},
-    [LOOK_AT] = {"look_at", line_blank_vector, offsetof(BlockValues, look_at), NULL},
-    [INTENSITY] = {"intensity", line_blank_vector, offsetof(BlockValues, intensity), &range_not_negative},
+    [POSITION] = {"position", line_vector, offsetof(BlockValues, position), NULL},
+    [LOOK_AT] = {"look_at", line_vector, offsetof(BlockValues, look_at), NULL},
+    [INTENSITY] = {"intensity", line_vector, offsetof(BlockValues, intensity), &range_not_negative},
     [RADIUS] = {"radius", line_number, offsetof(BlockValues, radius), &range_positive},
     [ANGLE] = {"angle", line_number, offsetof(BlockValues, angle), &range_radians},
-    [CENTER] = {"center", line_blank_vector, offsetof(BlockValues, center), NULL},
-    [NORMAL] = {"normal", line_blank_vector, offsetof(BlockValues, normal), NULL},
-    [COLOR] = {"color", line_blank_vector, offsetof(BlockValues, color), &range_color},
-    [DIFFUSE] = {"diffuse", line_blank_vector, offsetof(BlockValues, diffuse), &range_not_negative},
+    [CENTER] = {"center", line_vector, offsetof(BlockValues, center), NULL},
+    [NORMAL] = {"normal", line_vector, offsetof(BlockValues, normal), NULL},
+    [COLOR] = {"color", line_vector, offsetof(BlockValues, color), &range_color},
+    [DIFFUSE] = {"diffuse", line_vector, offsetof(BlockValues, diffuse), &range_not_negative},
     [SPECULAR] = {"specular", line_number, offsetof(BlockValues, specular), &range_not_negative},
 };
 
@@ -158,11 +158,12 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     unsigned seen = 0;
     bool all_read = true;
     for (;;) {
+        const Line before = *line;
         if (!line_next_filled(line))
             return report_error(&reader->report, reader->report.source->length, "'}' is missing");
         Word word = line_peek(line);
         if (word_opens_block(word)) {
-            line->next = line->start; // the next block is still read
+            *line = before; // the next block is still read
             return report_error(&reader->report, word.offset, "'}' is missing");
         }
         if (word_is(word, "}")) break;
@@ -213,8 +214,9 @@ static void block_open(CfgReader *reader)
         block_skip(line);
         return;
     }
-    if (!line_next_filled(line) || !word_is(line_peek(line), "{")) {
-        report_error(&reader->report, line->at, "'{' is missing");
+    const bool has_line = line_next_filled(line);
+    if (!has_line || !word_is(line_peek(line), "{")) {
+        report_error(&reader->report, has_line ? line->start : line_offset(line), "'{' is missing");
         return;
     }
     line_word(line);
@@ -243,8 +245,9 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {0.2, 0.2, 0.2}};
     CfgReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report, '\0')) {
-        line_elements(&reader.line, scene, line_next_filled, block_read_or_skip, &reader);
+    reader.line = line_first(&reader.report, '\n');
+    if (line_is_text(&reader.line)) {
+        line_elements(&reader.line, scene, block_read_or_skip, &reader);
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block =>camera");
     }

@@ -10,8 +10,8 @@
 
 bool dat_skip(DatReader *reader, const char *keyword)
 {
-    const bool is_next = word_is_in_any_case(free_peek(&reader->line), keyword);
-    if (is_next) free_word(&reader->line);
+    const bool is_next = word_is_in_any_case(value_peek(&reader->line), keyword);
+    if (is_next) value_word(&reader->line);
     return is_next;
 }
 
@@ -26,7 +26,7 @@ void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 
 bool dat_expect(DatReader *reader, const char *keyword)
 {
-    const Word word = free_peek(&reader->line);
+    const Word word = value_peek(&reader->line);
     if (dat_skip(reader, keyword)) return true;
     if (!word.length) return report_error(&reader->report, word.offset, "'%s' is missing", keyword);
     return report_error(&reader->report, word.offset, "'%s' is missing before '%.*s'", keyword,
@@ -35,12 +35,12 @@ bool dat_expect(DatReader *reader, const char *keyword)
 
 bool dat_number(DatReader *reader, const char *keyword, double *value)
 {
-    return dat_expect(reader, keyword) && free_number(&reader->line, keyword, NULL, value);
+    return dat_expect(reader, keyword) && line_number(&reader->line, keyword, NULL, value);
 }
 
 bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector)
 {
-    if (!free_vector(&reader->line, name, NULL, vector)) return false;
+    if (!line_vector(&reader->line, name, NULL, vector)) return false;
     vector->z = -vector->z;
     return true;
 }
@@ -54,23 +54,23 @@ static bool occlusion_read(DatReader *reader)
 {
     Vector3 unused;
     double number;
-    dat_warn(reader, free_peek(&reader->line).offset, "ambient occlusion is not shown");
+    dat_warn(reader, value_peek(&reader->line).offset, "ambient occlusion is not shown");
     return dat_expect(reader, "ambient_color") &&
-           free_vector(&reader->line, "ambient_color", NULL, &unused) &&
+           line_vector(&reader->line, "ambient_color", NULL, &unused) &&
            dat_number(reader, "rescale_direct", &number) && dat_number(reader, "samples", &number);
 }
 
 static bool shader_mode_read(DatReader *reader)
 {
     double unused;
-    const Word quality = free_word(&reader->line);
+    const Word quality = value_word(&reader->line);
     if (!word_is_in_any_case(quality, "full"))
         dat_warn(reader, quality.offset,
                  "shader mode '%.*s' leaves something out, such as shadows: shown in full",
                  WORD_TEXT(quality));
     while (!dat_skip(reader, "end_shader_mode")) {
         const Line before = reader->line;
-        const Word word = free_word(&reader->line);
+        const Word word = value_word(&reader->line);
         bool read = true;
         if (word_is_in_any_case(word, "trans_vmd"))
             reader->dims_clear = true;
@@ -83,7 +83,7 @@ static bool shader_mode_read(DatReader *reader)
             dat_warn(reader, word.offset,
                      "'shadow_filter_off' is not used: transparent objects cast shadows");
         else if (word_is_in_any_case(word, "trans_max_surfaces"))
-            read = free_number(&reader->line, "trans_max_surfaces", NULL, &unused);
+            read = line_number(&reader->line, "trans_max_surfaces", NULL, &unused);
         else if (word_is_in_any_case(word, "ambient_occlusion"))
             read = occlusion_read(reader);
         else if (!word_is_in_any_case(word, "fog_vmd") && !word_is_in_any_case(word, "shadow_filter_on")) {
@@ -99,7 +99,6 @@ static bool shader_mode_read(DatReader *reader)
 static bool scene_end(DatReader *reader)
 {
     reader->line.at = reader->line.end;
-    reader->line.next = reader->report.source->length;
     return true;
 }
 
@@ -164,16 +163,16 @@ static size_t statement_find(Word word)
 // Skips the rest of a statement, up to the next one.
 static void statement_skip(DatReader *reader)
 {
-    for (Word word = free_peek(&reader->line); word.length; word = free_peek(&reader->line)) {
+    for (Word word = value_peek(&reader->line); word.length; word = value_peek(&reader->line)) {
         if (statement_find(word) < STATEMENT_COUNT) return;
-        free_word(&reader->line);
+        value_word(&reader->line);
     }
 }
 
 static void statement_read(void *context)
 {
     DatReader *reader = context;
-    const Word word = free_word(&reader->line);
+    const Word word = value_word(&reader->line);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
         report_error(&reader->report, word.offset, "unknown statement '%.*s'", WORD_TEXT(word));
@@ -182,7 +181,7 @@ static void statement_read(void *context)
     } else {
         dat_warn(reader, word.offset, "'%s' is not shown", statements[index].keyword);
         for (int i = 0; i < statements[index].hidden_words; i++)
-            free_word(&reader->line);
+            value_word(&reader->line);
     }
     statement_skip(reader);
 }
@@ -191,10 +190,13 @@ bool scene_read_dat(Scene *scene, const Source *source, const SceneOptions *opti
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report, '#')) {
-        if (!word_is_in_any_case(free_peek(&reader.line), "begin_scene"))
-            report_error(&reader.report, free_peek(&reader.line).offset, "a scene starts with 'begin_scene'");
-        line_elements(&reader.line, scene, line_reach_word, statement_read, &reader);
+    reader.line = line_first(&reader.report, '#');
+    reader.line.spans_lines = true;
+    if (line_is_text(&reader.line)) {
+        if (!word_is_in_any_case(value_peek(&reader.line), "begin_scene"))
+            report_error(&reader.report, value_peek(&reader.line).offset,
+                         "a scene starts with 'begin_scene'");
+        line_elements(&reader.line, scene, statement_read, &reader);
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block 'camera'");
     }

@@ -12,7 +12,7 @@
 static bool count_read(DatReader *reader, const char *name, unsigned *count)
 {
     static const Range range_count = {0, INT32_MAX, false, "from 0 to 2147483647"};
-    return free_whole_number(&reader->line, name, &range_count, count);
+    return line_whole_number(&reader->line, name, &range_count, count);
 }
 
 // Reads the texture and adds the object, unless it has a size that is not above 0, which Tachyon never hits.
@@ -226,7 +226,7 @@ bool dat_colored_triangle(DatReader *reader)
     Material material;
     if (!vertices_read(reader, &object) || !normals_read(reader, &object)) return false;
     for (int i = 0; i < 3; i++)
-        if (!dat_expect(reader, names[i]) || !free_vector(&reader->line, names[i], NULL, &colors[i]))
+        if (!dat_expect(reader, names[i]) || !line_vector(&reader->line, names[i], NULL, &colors[i]))
             return false;
     if (!dat_texture_body(reader, &material)) return false;
     const Color color = mean_color(reader, offset, &colors[0], &colors[1], &colors[2]);
@@ -255,7 +255,7 @@ static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count
     array_reserve(vectors, 1);
     for (unsigned i = 0; i < count; i++) {
         Vector3 vector = {0};
-        if (!(are_colors ? free_vector(&reader->line, name, NULL, &vector)
+        if (!(are_colors ? line_vector(&reader->line, name, NULL, &vector)
                          : dat_coordinates(reader, name, &vector))) {
             free(vectors.items);
             return NULL;
@@ -290,7 +290,7 @@ static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
     const size_t index_count = (is_strip ? 1 : 3) * (size_t)count;
     for (size_t i = 0; i < index_count; i++) {
         unsigned index;
-        const size_t index_offset = free_peek(&reader->line).offset;
+        const size_t index_offset = value_peek(&reader->line).offset;
         if (!count_read(reader, name, &index)) return false;
         if (index >= array->mesh.vertex_count)
             return report_error(&reader->report, index_offset,

@@ -29,7 +29,7 @@ typedef struct {
 static bool factor_read(DatReader *reader, const char *name, const Range *range, double *factor)
 {
     double number;
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     if (!line_number(&reader->line, name, NULL, &number)) return false;
     if (range_holds(range, number))
         *factor = number;
@@ -41,8 +41,8 @@ static bool factor_read(DatReader *reader, const char *name, const Range *range,
 static bool color_read(DatReader *reader, Color *color)
 {
     Color read;
-    const size_t offset = free_peek(&reader->line).offset;
-    if (!free_vector(&reader->line, "color", NULL, &read)) return false;
+    const size_t offset = value_peek(&reader->line).offset;
+    if (!line_vector(&reader->line, "color", NULL, &read)) return false;
     if (vector_is_zero(vector_min(read, vector_all(0))))
         *color = read;
     else
@@ -52,7 +52,7 @@ static bool color_read(DatReader *reader, Color *color)
 
 static bool phong_read(DatReader *reader, Texture *texture)
 {
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     texture->is_metal = dat_skip(reader, "metal");
     if (texture->is_metal)
         dat_warn(reader, offset, "highlights have the light's color, not that of metal");
@@ -63,7 +63,7 @@ static bool phong_read(DatReader *reader, Texture *texture)
 
 static bool transmode_read(DatReader *reader)
 {
-    const Word mode = free_word(&reader->line);
+    const Word mode = value_word(&reader->line);
     if (word_is_in_any_case(mode, "r3d"))
         dat_warn(reader, mode.offset, "'transmode r3d' is not used: opacity does not depend on the angle");
     return true;
@@ -71,7 +71,7 @@ static bool transmode_read(DatReader *reader)
 
 static bool outline_read(DatReader *reader, const char *name)
 {
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     double number;
     if (!line_number(&reader->line, name, NULL, &number)) return false;
     if (number != 0) dat_warn(reader, offset, "outlines are not shown");
@@ -84,14 +84,14 @@ static bool function_read(DatReader *reader)
     enum { FIRST_IMAGE = 7, LAST = 10 };
     static const Range range_function = {0, LAST, false, "from 0 to 10"};
     static const char *const keywords[] = {"center", "rotate", "scale", "uaxis", "vaxis", "waxis"};
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     unsigned function;
     if (!line_whole_number(&reader->line, "texfunc", &range_function, &function)) return false;
     if (function > 0) dat_warn(reader, offset, "texfunc %u is not shown: the color is used", function);
-    if (function >= FIRST_IMAGE) free_word(&reader->line);
+    if (function >= FIRST_IMAGE) value_word(&reader->line);
     for (size_t i = 0; i < COUNT_OF(keywords) && function > 0; i++) {
         Vector3 unused;
-        if (dat_skip(reader, keywords[i]) && !free_vector(&reader->line, keywords[i], NULL, &unused))
+        if (dat_skip(reader, keywords[i]) && !line_vector(&reader->line, keywords[i], NULL, &unused))
             return false;
     }
     return true;
@@ -141,10 +141,10 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
 bool dat_texture_body(DatReader *reader, Material *material)
 {
     Texture texture = {.ambient = 0.1, .diffuse = 0.9, .opacity = 1, .phong_size = 100, .color = {1, 1, 1}};
-    Word word = free_word(&reader->line);
+    Word word = value_word(&reader->line);
     while (!word_is_in_any_case(word, "texfunc") && !word_is_in_any_case(word, "vcst")) {
         if (!key_read(reader, word, &texture)) return false;
-        word = free_word(&reader->line);
+        word = value_word(&reader->line);
     }
     *material = material_of(reader, &texture);
     return word_is_in_any_case(word, "vcst") || function_read(reader);
@@ -195,7 +195,7 @@ static uint32_t texture_find(DatReader *reader, Word name)
 
 bool dat_texture(DatReader *reader, uint32_t *material)
 {
-    const Word word = free_word(&reader->line);
+    const Word word = value_word(&reader->line);
     if (!word.length) return report_error(&reader->report, word.offset, "the object's texture is missing");
     if (!word_is_in_any_case(word, "texture")) {
         *material = texture_find(reader, word);
@@ -209,7 +209,7 @@ bool dat_texture(DatReader *reader, uint32_t *material)
 
 bool dat_texture_definition(DatReader *reader)
 {
-    const Word name = free_word(&reader->line);
+    const Word name = value_word(&reader->line);
     dat_skip(reader, "texture");
     Material material;
     if (!dat_texture_body(reader, &material)) return false;
@@ -219,7 +219,7 @@ bool dat_texture_definition(DatReader *reader)
 
 bool dat_texture_alias(DatReader *reader)
 {
-    const Word name = free_word(&reader->line), other = free_word(&reader->line);
+    const Word name = value_word(&reader->line), other = value_word(&reader->line);
     texture_add(reader, name, texture_find(reader, other));
     return true;
 }

@@ -5,8 +5,8 @@
 bool dat_resolution(DatReader *reader)
 {
     return line_is_first(&reader->line, &reader->has_resolution, "resolution") &&
-           free_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
-           free_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height);
+           line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
+           line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height);
 }
 
 // Holds the values of a camera's block.
@@ -20,7 +20,7 @@ static bool projection_read(DatReader *reader)
 {
     double unused;
     if (!dat_skip(reader, "projection")) return true;
-    const Word name = free_word(&reader->line);
+    const Word name = value_word(&reader->line);
     if (word_is_in_any_case(name, "orthographic")) {
         reader->scene->camera.projection = PROJECTION_ORTHOGRAPHIC;
     } else if (word_is_in_any_case(name, "perspective_dof")) {
@@ -39,11 +39,11 @@ static bool camera_block_read(DatReader *reader, CameraBlock *block)
 {
     double unused;
     if (!projection_read(reader) || !dat_expect(reader, "zoom") ||
-        !free_number(&reader->line, "zoom", &range_positive, &block->zoom) ||
+        !line_number(&reader->line, "zoom", &range_positive, &block->zoom) ||
         !dat_expect(reader, "aspectratio"))
         return false;
-    const size_t offset = free_peek(&reader->line).offset;
-    if (!free_number(&reader->line, "aspectratio", &range_positive, &block->aspect)) return false;
+    const size_t offset = value_peek(&reader->line).offset;
+    if (!line_number(&reader->line, "aspectratio", &range_positive, &block->aspect)) return false;
     if (block->aspect != 1)
         report_warning(&reader->report, offset, "'aspectratio' is not used: pixels are square");
     if (!dat_number(reader, "antialiasing", &unused) || !dat_number(reader, "raydepth", &unused) ||
@@ -52,7 +52,7 @@ static bool camera_block_read(DatReader *reader, CameraBlock *block)
         return false;
     block->has_frustum = dat_skip(reader, "frustum");
     for (int i = 0; i < 4 && block->has_frustum; i++)
-        if (!free_number(&reader->line, "frustum", NULL, &block->frustum[i])) return false;
+        if (!line_number(&reader->line, "frustum", NULL, &block->frustum[i])) return false;
     return dat_expect(reader, "end_camera");
 }
 
@@ -87,13 +87,13 @@ bool dat_camera(DatReader *reader)
 
 bool dat_background(DatReader *reader)
 {
-    return free_vector(&reader->line, "background", NULL, &reader->scene->background);
+    return line_vector(&reader->line, "background", NULL, &reader->scene->background);
 }
 
 static bool fading_read(DatReader *reader, Light *light)
 {
     static const char *const names[] = {"constant", "linear", "quadratic"};
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     if (!dat_skip(reader, "attenuation")) return true;
     double sum = 0;
     for (int i = 0; i < 3; i++) {
@@ -106,8 +106,8 @@ static bool fading_read(DatReader *reader, Light *light)
 
 static bool light_end(DatReader *reader, Light light)
 {
-    const size_t offset = free_peek(&reader->line).offset;
-    if (!dat_expect(reader, "color") || !free_vector(&reader->line, "color", NULL, &light.color))
+    const size_t offset = value_peek(&reader->line).offset;
+    if (!dat_expect(reader, "color") || !line_vector(&reader->line, "color", NULL, &light.color))
         return false;
     if (!vector_is_zero(vector_min(light.color, vector_all(0))))
         return report_error(&reader->report, offset, "'color' must be 0 or more");
@@ -122,7 +122,7 @@ static bool light_place_read(DatReader *reader, Light *light)
 {
     double radius;
     if (!dat_vector(reader, "center", &light->position)) return false;
-    const size_t offset = free_peek(&reader->line).offset;
+    const size_t offset = value_peek(&reader->line).offset;
     if (!dat_number(reader, "rad", &radius)) return false;
     if (radius > 0) dat_warn(reader, offset, "lights are not visible themselves");
     return true;
@@ -146,7 +146,7 @@ bool dat_spotlight(DatReader *reader)
     double start;
     if (!light_place_read(reader, &light) || !dat_vector(reader, "direction", &light.direction) ||
         !dat_number(reader, "falloff_start", &start) || !dat_expect(reader, "falloff_end") ||
-        !free_number(&reader->line, "falloff_end", &range_half_turn, &light.spot.half_angle))
+        !line_number(&reader->line, "falloff_end", &range_half_turn, &light.spot.half_angle))
         return false;
     light.spot.penumbra = light.spot.half_angle - fmin(fmax(start, 0), light.spot.half_angle);
     return fading_read(reader, &light) && light_end(reader, light);

@@ -1,34 +1,54 @@
 #include "host/import/line.h"
-#include "host/base/text.h"
+#include "host/base/array.h"
 #include "host/import/place.h"
 
 #include <string.h>
 #include <strings.h>
 
-bool line_open(Line *line, Report *report, char comment)
+Line line_first(Report *report, char comment)
 {
     const Source *source = report->source;
-    bool has_mark = source->length >= 3 && !memcmp(source->bytes, "\xEF\xBB\xBF", 3);
-    *line = (Line){.report = report, .next = has_mark ? 3 : 0, .comment = comment};
-    const char *nul = source->length ? memchr(source->bytes, '\0', source->length) : NULL;
-    if (nul) report_error(report, (size_t)(nul - source->bytes), "not text: a NUL character");
-    return !nul;
+    const bool has_mark = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0;
+    Line line = {.report = report, .text = source->bytes, .comment = comment, .start = has_mark ? 3 : 0};
+    line.at = line.text + line.start;
+    line.end = line.text + source->length;
+    return line;
+}
+
+Line line_first_of_mesh(Report *report)
+{
+    Line line = line_first(report, '#');
+    line.joins_lines = true;
+    return line;
+}
+
+bool line_is_text(const Line *line)
+{
+    const char *nul = line->at < line->end ? memchr(line->at, '\0', (size_t)(line->end - line->at)) : NULL;
+    return !nul || report_error(line->report, (size_t)(nul - line->text), "not text: a NUL character");
+}
+
+void line_skip(Line *line)
+{
+    while (!line_ends_at(line, line->at))
+        line->at++;
 }
 
 bool line_next(Line *line)
 {
-    const Source *source = line->report->source;
-    if (line->next >= source->length) return false;
-    line->start = line->at = line->next;
-    const char *bytes = source->bytes + line->start;
-    line->end = line->start;
-    while (line->end < source->length &&
-           !text_ends_line(source->bytes + line->end, source->length - line->end))
-        line->end++;
-    line->next = line->end < source->length ? line->end + 1 : line->end;
-    if (line->end > line->start && source->bytes[line->end - 1] == '\r') line->end--;
-    const char *comment = line->comment ? memchr(bytes, line->comment, line->end - line->start) : NULL;
-    if (comment) line->end = (size_t)(comment - source->bytes);
+    line_skip(line);
+    const char *at = line->at;
+    bool is_joined;
+    do {
+        while (at < line->end && *at != '\n' && *at != '\r')
+            at++;
+        if (line->end - at <= 1) return false;
+        is_joined = line->joins_lines && at > line->text && at[-1] == '\\';
+        at += *at == '\r' && at[1] == '\n' ? 2 : 1;
+    } while (is_joined);
+    if (at == line->end) return false;
+    line->at = at;
+    line->start = line_offset(line);
     return true;
 }
 
@@ -39,25 +59,15 @@ bool line_next_filled(Line *line)
 
 bool line_reach_word(Line *line)
 {
-    while (!line_peek(line).length)
+    while (!line_has_word(line))
         if (!line_next(line)) return false;
     return true;
 }
 
-size_t line_skip_blanks(Line *line)
+size_t line_word_offset(Line *line)
 {
-    while (line->at < line->end && character_is_blank(line->report->source->bytes[line->at]))
-        line->at++;
-    return line->at;
-}
-
-Word line_word(Line *line)
-{
-    const char *bytes = line->report->source->bytes;
-    const size_t start = line_skip_blanks(line);
-    while (line->at < line->end && !character_is_blank(bytes[line->at]))
-        line->at++;
-    return (Word){.text = bytes + start, .offset = start, .length = line->at - start};
+    line_has_word(line);
+    return line_offset(line);
 }
 
 Word line_peek(const Line *line)
@@ -66,16 +76,36 @@ Word line_peek(const Line *line)
     return line_word(&copy);
 }
 
-Word free_peek(Line *line)
+Word value_peek(Line *line)
 {
-    line_reach_word(line);
+    if (line->spans_lines) line_reach_word(line);
     return line_peek(line);
 }
 
-Word free_word(Line *line)
+Word value_word(Line *line)
 {
-    line_reach_word(line);
+    if (line->spans_lines) line_reach_word(line);
     return line_word(line);
+}
+
+Word line_rest(Line *line)
+{
+    const size_t offset = line_word_offset(line);
+    const char *start = line->at;
+    while (line->at < line->end && *line->at != '\n' && *line->at != '\r')
+        line->at++;
+    const char *end = line->at;
+    while (end > start && character_is_blank(end[-1]))
+        end--;
+    return (Word){start, offset, (size_t)(end - start)};
+}
+
+int line_try_numbers(Line *line, double *numbers, int most)
+{
+    int count = 0;
+    while (count < most && line_try_number(line, &numbers[count]) == NUMBER_READ)
+        count++;
+    return count;
 }
 
 bool words_equal(Word a, Word b)
@@ -99,12 +129,11 @@ bool word_is_number(Word word)
     return number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
 }
 
-// Returns the next word, or reports an error if there is none.
+// Returns the next value's word, or reports an error if there is none.
 static bool line_value(Line *line, const char *name, Word *word)
 {
-    *word = line_word(line);
-    if (!word->length) report_error(line->report, word->offset, "'%s' is missing", name);
-    return word->length > 0;
+    *word = value_word(line);
+    return word->length > 0 || report_error(line->report, word->offset, "'%s' is missing", name);
 }
 
 bool line_field(Line *line, const LineField *field, void *values)
@@ -115,16 +144,21 @@ bool line_field(Line *line, const LineField *field, void *values)
 bool line_number(Line *line, const char *name, const Range *range, void *value)
 {
     Word word;
-    return line_value(line, name, &word) && number_read_field(line->report, word, name, range, value);
+    if (!line_value(line, name, &word)) return false;
+    const bool is_read = number_read_field(line->report, word, name, range, value);
+    if (!is_read) line->at = word.text;
+    return is_read;
 }
 
 bool line_whole_number(Line *line, const char *name, const Range *range, void *value)
 {
     double number;
-    size_t offset = line_peek(line).offset;
+    const Word word = value_peek(line);
     if (!line_number(line, name, range, &number)) return false;
-    if (number != floor(number))
-        return report_error(line->report, offset, "'%s' must be a whole number", name);
+    if (number != floor(number)) {
+        line->at = word.text;
+        return report_error(line->report, word.offset, "'%s' must be a whole number", name);
+    }
     *(unsigned *)value = (unsigned)number;
     return true;
 }
@@ -191,54 +225,29 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, void *v
     return true;
 }
 
-bool line_blank_vector(Line *line, const char *name, const Range *range, void *value)
+bool line_vector(Line *line, const char *name, const Range *range, void *value)
 {
     double values[3];
     for (size_t i = 0; i < 3; i++) {
-        if (i && !line_peek(line).length)
-            return report_error(line->report, line->at, "'%s' must be three numbers, not %zu", name, i);
+        if (i > 0 && !line->spans_lines && line_peek(line).length == 0)
+            return report_error(line->report, line_offset(line), "'%s' must be three numbers, not %zu", name,
+                                i);
         if (!line_number(line, name, range, &values[i])) return false;
     }
     *(Vector3 *)value = (Vector3){values[0], values[1], values[2]};
     return true;
 }
 
-static bool free_read(Line *line, LineReader *read, const char *name, const Range *range, void *value)
-{
-    line_reach_word(line);
-    const size_t start = line->at;
-    const bool is_read = read(line, name, range, value);
-    if (!is_read) line->at = start;
-    return is_read;
-}
-
-bool free_number(Line *line, const char *name, const Range *range, void *value)
-{
-    return free_read(line, line_number, name, range, value);
-}
-
-bool free_whole_number(Line *line, const char *name, const Range *range, void *value)
-{
-    return free_read(line, line_whole_number, name, range, value);
-}
-
-bool free_vector(Line *line, const char *name, const Range *range, void *value)
-{
-    Vector3 *vector = value;
-    return free_number(line, name, range, &vector->x) && free_number(line, name, range, &vector->y) &&
-           free_number(line, name, range, &vector->z);
-}
-
-bool line_elements(Line *line, Scene *scene, bool (*next)(Line *line), void (*read)(void *reader),
-                   void *reader)
+bool line_elements(Line *line, Scene *scene, void (*read)(void *reader), void *reader)
 {
     bool is_empty = true;
     Places places = places_open(line->report->source, NULL);
-    while (!report_is_full(line->report) && next(line)) {
-        const size_t offset = line_peek(line).offset;
+    while (!report_is_full(line->report) && line_reach_word(line)) {
+        const size_t offset = line_offset(line);
         is_empty = false;
         read(reader);
         places_record(&places, scene, offset);
+        if (!line->spans_lines && !line_next(line)) break;
     }
     places_close(&places);
     return !is_empty;
@@ -256,4 +265,13 @@ bool line_is_first(const Line *line, bool *has_one, const char *what)
     if (*has_one) return report_error(line->report, line->start, "a second %s", what);
     *has_one = true;
     return true;
+}
+
+void unused_record(UnusedWords *unused, Report *report, Word word, const char *what)
+{
+    for (size_t i = 0; i < unused->count; i++)
+        if (words_equal(unused->words[i], word)) return;
+    if (unused->count == COUNT_OF(unused->words)) return;
+    unused->words[unused->count++] = word;
+    report_warning(report, word.offset, "'%.*s' %s", WORD_TEXT(word), what);
 }

@@ -23,15 +23,15 @@ static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
 static bool read_color(NffReader *reader, Color *color)
 {
-    return free_vector(&reader->line, "color", &range_not_negative, color);
+    return line_vector(&reader->line, "color", &range_not_negative, color);
 }
 
 static bool read_size(Line *line, const char *name, const Range *range, void *value)
 {
     unsigned *size = value;
     (void)name;
-    return free_whole_number(line, "width", range, &size[0]) &&
-           free_whole_number(line, "height", range, &size[1]);
+    return line_whole_number(line, "width", range, &size[0]) &&
+           line_whole_number(line, "height", range, &size[1]);
 }
 
 typedef struct {
@@ -42,11 +42,11 @@ typedef struct {
 
 // The first four are required.
 static const LineField view_keys[] = {
-    {"from", free_vector, offsetof(View, from), NULL},
-    {"at", free_vector, offsetof(View, at), NULL},
-    {"up", free_vector, offsetof(View, up), NULL},
-    {"angle", free_number, offsetof(View, angle), &range_half_turn},
-    {"hither", free_number, offsetof(View, hither), NULL},
+    {"from", line_vector, offsetof(View, from), NULL},
+    {"at", line_vector, offsetof(View, at), NULL},
+    {"up", line_vector, offsetof(View, up), NULL},
+    {"angle", line_number, offsetof(View, angle), &range_half_turn},
+    {"hither", line_number, offsetof(View, hither), NULL},
     {"resolution", read_size, offsetof(View, size), &range_pixels},
 };
 enum { VIEW_REQUIRED = 4, VIEW_KEYS = COUNT_OF(view_keys) };
@@ -101,7 +101,7 @@ static bool read_background(NffReader *reader)
 static bool read_light(NffReader *reader)
 {
     Light light = {.type = LIGHT_POINT};
-    if (!free_vector(&reader->line, "position", NULL, &light.position)) return false;
+    if (!line_vector(&reader->line, "position", NULL, &light.position)) return false;
     if (!line_peek(&reader->line).length)
         array_push(reader->white_lights, reader->scene->lights.count);
     else if (!read_color(reader, &light.color))
@@ -117,13 +117,13 @@ static bool read_material(NffReader *reader)
     double ior;
     reader->has_material = true;
     if (!read_color(reader, &material.color) ||
-        !free_number(line, "Kd", &range_not_negative, &material.ambient) ||
-        !free_number(line, "Ks", &range_unit, &material.specular.largest) ||
-        !free_number(line, "Shine", &range_not_negative, &material.shininess) ||
-        !free_number(line, "T", &range_unit, &material.transmission.largest))
+        !line_number(line, "Kd", &range_not_negative, &material.ambient) ||
+        !line_number(line, "Ks", &range_unit, &material.specular.largest) ||
+        !line_number(line, "Shine", &range_not_negative, &material.shininess) ||
+        !line_number(line, "T", &range_unit, &material.transmission.largest))
         return false;
     const Range *range = material.transmission.largest > 0 ? &range_positive : &range_not_negative;
-    if (!free_number(line, "index of refraction", range, &ior) || !line_end(line)) return false;
+    if (!line_number(line, "index of refraction", range, &ior) || !line_end(line)) return false;
     if (ior > 0) material.ior = ior;
     material.diffuse = vector_all(material.ambient);
     material.reflection = material.specular;
@@ -148,9 +148,9 @@ static bool read_sphere(NffReader *reader)
 {
     Object object = {.type = SHAPE_SPHERE};
     double radius;
-    if (!free_vector(&reader->line, "center", NULL, &object.as.sphere.center)) return false;
-    const size_t offset = free_peek(&reader->line).offset;
-    if (!free_number(&reader->line, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
+    if (!line_vector(&reader->line, "center", NULL, &object.as.sphere.center)) return false;
+    const size_t offset = value_peek(&reader->line).offset;
+    if (!line_number(&reader->line, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
     if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be 0");
     object.as.sphere.radius = fabs(radius);
     object.as.sphere.only_inside = radius < 0;
@@ -164,10 +164,10 @@ static bool read_cone(NffReader *reader)
     Vector3 base, apex;
     double base_radius, apex_radius;
     size_t offset = reader->line.start;
-    if (!free_vector(&reader->line, "base", NULL, &base) ||
-        !free_number(&reader->line, "radius", NULL, &base_radius) ||
-        !free_vector(&reader->line, "apex", NULL, &apex) ||
-        !free_number(&reader->line, "radius", NULL, &apex_radius) || !line_end(&reader->line))
+    if (!line_vector(&reader->line, "base", NULL, &base) ||
+        !line_number(&reader->line, "radius", NULL, &base_radius) ||
+        !line_vector(&reader->line, "apex", NULL, &apex) ||
+        !line_number(&reader->line, "radius", NULL, &apex_radius) || !line_end(&reader->line))
         return false;
     Vector3 axis = vector_subtract(apex, base);
     const char *fault = NULL;
@@ -199,14 +199,14 @@ static bool read_cone(NffReader *reader)
 static bool read_corners(NffReader *reader, bool smooth)
 {
     unsigned count;
-    if (!free_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
+    if (!line_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
     reader->corners.count = reader->normals.count = 0;
     for (unsigned i = 0; i < count; i++) {
         Vector3 corner, normal = {0, 0, 0};
-        if (!free_vector(&reader->line, "vertex", NULL, &corner)) return false;
+        if (!line_vector(&reader->line, "vertex", NULL, &corner)) return false;
         if (smooth) {
-            const size_t offset = free_peek(&reader->line).offset;
-            if (!free_vector(&reader->line, "normal", NULL, &normal)) return false;
+            const size_t offset = value_peek(&reader->line).offset;
+            if (!line_vector(&reader->line, "normal", NULL, &normal)) return false;
             if (vector_is_zero(normal))
                 return report_error(&reader->report, offset, "'normal' must not be zero");
         }
@@ -270,10 +270,10 @@ static void element_read(void *context)
     for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (!word_is(name, elements[i].name)) continue;
         reader->has_fault = !elements[i].read(reader);
-        if (reader->has_fault) reader->line.at = reader->line.end;
+        if (reader->has_fault) line_skip(&reader->line);
         return;
     }
-    reader->line.at = reader->line.end;
+    line_skip(&reader->line);
     bool is_number = word_is_number(name);
     if (reader->has_fault && (is_number || view_key_index(name) < VIEW_KEYS)) return;
     reader->has_fault = true;
@@ -302,8 +302,10 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     NffReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report, '#')) {
-        if (!line_elements(&reader.line, scene, line_reach_word, element_read, &reader))
+    reader.line = line_first(&reader.report, '#');
+    reader.line.spans_lines = true;
+    if (line_is_text(&reader.line)) {
+        if (!line_elements(&reader.line, scene, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_view && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "the scene has no view (element 'v')");

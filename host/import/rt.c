@@ -299,9 +299,10 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     RtReader reader = {.report = report_open(source, messages), .scene = scene, .lenient = options->lenient};
-    if (line_open(&reader.line, &reader.report, '#')) {
-        reader.line.joins_blanks = reader.lenient;
-        if (!line_elements(&reader.line, scene, line_next_filled, element_read, &reader))
+    reader.line = line_first(&reader.report, '#');
+    reader.line.joins_blanks = reader.lenient;
+    if (line_is_text(&reader.line)) {
+        if (!line_elements(&reader.line, scene, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a line with C");

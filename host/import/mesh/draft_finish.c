@@ -1,8 +1,8 @@
 // Turns a draft into a mesh. Checks it, cuts its polygons into triangles, places it in the world and makes
 // one vertex for each combination of position, normal and texture coordinates.
 #include "host/base/memory.h"
+#include "host/import/line.h"
 #include "host/import/mesh/draft.h"
-#include "host/import/mesh/scan.h"
 #include "host/import/number.h"
 #include "host/scene/affine.h"
 #include "host/scene/polygon.h"
@@ -44,9 +44,9 @@ static bool position_fails(MeshDraft *draft, uint32_t position)
     if (!place)
         return draft_refuse(draft, "vertex %zu (from %zu) is not finite or too large",
                             position + draft->first_index, draft->first_index);
-    const Source *source = &draft->source;
-    Scan scan = {source->bytes + place->offset, source->bytes + source->length, source->bytes};
-    const Word word = scan_word(&scan);
+    Line line = line_first_of_mesh(&draft->report);
+    line.at = line.text + place->offset;
+    const Word word = line_word(&line);
     if (word.length == 0) return draft_fails(draft, place->offset, "a coordinate of the vertex is missing");
     return draft_fails(draft, place->offset, "'%.*s' is not a coordinate: a number up to %g", WORD_TEXT(word),
                        NUMBER_MAX);

@@ -5,7 +5,7 @@
 #include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/image/image.h"
-#include "host/import/mesh/scan.h"
+#include "host/import/line.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -41,7 +41,7 @@ typedef struct {
     // of the current file
     const char *path;
     Report report;
-    Scan scan;
+    Line line;
     UnusedWords unused;
     size_t first_material;
     bool has_reflection; // whether reflection was warned of
@@ -91,7 +91,7 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
 
 static void material_start(MtlReader *reader)
 {
-    const Word name = scan_rest(&reader->scan);
+    const Word name = line_rest(&reader->line);
     MtlMaterial material = {.name = memory_copy_part(name.text, name.length),
                             .material = material_default(),
                             .scene_index = DRAFT_NONE,
@@ -101,13 +101,6 @@ static void material_start(MtlReader *reader)
                             .illumination = {.value = NAN}};
     material.material.ior = 1;
     array_push(reader->materials, material);
-}
-
-// Moves to the line's next word, or to its end, and returns its offset.
-static size_t word_offset(MtlReader *reader)
-{
-    scan_more(&reader->scan);
-    return scan_offset(&reader->scan);
 }
 
 // A statement of a material and the member that it sets.
@@ -126,8 +119,8 @@ static bool factor_read(MtlReader *reader, const Statement *statement, void *tar
 {
     const Range *range = statement->range;
     double number;
-    const size_t offset = word_offset(reader);
-    if (scan_number(&reader->scan, &number) != NUMBER_READ) {
+    const size_t offset = line_word_offset(&reader->line);
+    if (line_try_number(&reader->line, &number) != NUMBER_READ) {
         report_warning(&reader->report, offset, "no number up to %g: the default is used", NUMBER_MAX);
         return false;
     }
@@ -144,19 +137,19 @@ static bool factor_read(MtlReader *reader, const Statement *statement, void *tar
 static bool placed_factor_read(MtlReader *reader, const Statement *statement, void *target)
 {
     MtlNumber *number = target;
-    number->offset = word_offset(reader);
+    number->offset = line_word_offset(&reader->line);
     return factor_read(reader, statement, &number->value);
 }
 
 static bool dissolve_read(MtlReader *reader, const Statement *statement, void *target)
 {
     MtlNumber *number = target;
-    Scan ahead = reader->scan;
-    const Word word = scan_word(&ahead);
+    Line ahead = reader->line;
+    const Word word = line_word(&ahead);
     number->offset = word.offset;
     if (word_is(word, "-halo")) {
         unused_record(&reader->unused, &reader->report, word, "is not used");
-        reader->scan = ahead;
+        reader->line = ahead;
     }
     return factor_read(reader, statement, &number->value);
 }
@@ -168,7 +161,7 @@ static bool color_read(MtlReader *reader, const Statement *statement, void *targ
     int count = 0;
     do
         if (!factor_read(reader, statement, &numbers[count])) return false;
-    while (++count < 3 && scan_more(&reader->scan));
+    while (++count < 3 && line_has_word(&reader->line));
     if (count == 1) numbers[1] = numbers[0];
     if (count < 3) numbers[2] = numbers[1];
     *(Color *)target = (Color){numbers[0], numbers[1], numbers[2]};
@@ -187,17 +180,16 @@ static bool strength_read(MtlReader *reader, const Statement *statement, void *t
 // Reads a texture's option, which starts with `-` and has up to three numbers or one word. Stores the value
 // of -bm in *multiplier unless `multiplier` is NULL, and skips other options. Sets *is_used to whether it
 // stored the value.
-static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
+static bool texture_option_read(Line *line, double *multiplier, bool *is_used)
 {
-    Scan ahead = *scan;
-    const Word word = scan_word(&ahead);
+    Line ahead = *line;
+    const Word word = line_word(&ahead);
     double unused[3];
     if (word.length < 2 || word.text[0] != '-') return false;
-    *scan = ahead;
-    *is_used =
-        multiplier && word_is(word, "-bm") && scan_more(scan) && scan_number(scan, multiplier) == NUMBER_READ;
+    *line = ahead;
+    *is_used = multiplier && word_is(word, "-bm") && line_try_number(line, multiplier) == NUMBER_READ;
     if (*is_used) return true;
-    if (scan_numbers(scan, unused, 3) == 0) scan_word(scan);
+    if (line_try_numbers(line, unused, 3) == 0) line_word(line);
     return true;
 }
 
@@ -206,16 +198,16 @@ static bool texture_read(MtlReader *reader, const Statement *statement, void *ta
 {
     MtlImage *image = target;
     const bool has_normals = statement->content == TEXTURE_NORMALS || statement->content == TEXTURE_BUMPS;
-    const size_t offset = word_offset(reader);
+    const size_t offset = line_word_offset(&reader->line);
     if (has_normals && image->path)
         report_warning(&reader->report, offset, "a second map of normals or heights: it replaces the first");
     free(image->path);
     *image = (MtlImage){.content = statement->content, .strength = 1};
     bool has_options = false, is_used;
-    while (texture_option_read(&reader->scan, has_normals ? &image->strength : NULL, &is_used))
+    while (texture_option_read(&reader->line, has_normals ? &image->strength : NULL, &is_used))
         has_options |= !is_used;
     if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
-    const Word name = scan_rest(&reader->scan);
+    const Word name = line_rest(&reader->line);
     bool is_moved;
     char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
     if (is_moved)
@@ -258,7 +250,7 @@ static const Statement statements[] = {
 
 static void line_read(MtlReader *reader)
 {
-    const Word word = scan_word(&reader->scan);
+    const Word word = line_word(&reader->line);
     MtlMaterial *material = material_of(reader);
     if (word.length == 0) return;
     if (word_is(word, "newmtl")) {
@@ -301,14 +293,14 @@ static bool library_read(MtlReader *reader, const char *path)
         const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         reader->path = path;
         reader->report = report_open(&source, &messages);
-        reader->scan = (Scan){source.bytes, source.bytes + source.length, source.bytes};
+        reader->line = line_first_of_mesh(&reader->report);
         reader->unused.count = 0;
         reader->has_reflection = false;
         reader->first_material = reader->materials.count;
-        if (scan_is_text(&reader->scan, &reader->report)) {
+        if (line_is_text(&reader->line)) {
             do
                 line_read(reader);
-            while (scan_line(&reader->scan));
+            while (line_next(&reader->line));
             MtlMaterial *last = material_of(reader);
             if (last) material_end(reader, last);
         }
@@ -332,12 +324,14 @@ static bool library_of_word_read(MtlReader *reader, Word name)
 }
 
 // Reads the files of a line, which is one name with blanks or several names.
-static bool libraries_of_line_read(MtlReader *reader, Word line)
+static bool libraries_of_line_read(MtlReader *reader, Word names)
 {
-    bool read = library_of_word_read(reader, line);
-    if (read || !memchr(line.text, ' ', line.length)) return read;
-    Scan scan = {line.text, line.text + line.length, line.text - line.offset};
-    for (Word word = scan_word(&scan); word.length > 0 && word.text < scan.end; word = scan_word(&scan))
+    bool read = library_of_word_read(reader, names);
+    if (read || !memchr(names.text, ' ', names.length)) return read;
+    Line line = line_first_of_mesh(&reader->draft->report);
+    line.at = names.text;
+    for (Word word = line_word(&line); word.length > 0 && word.text < names.text + names.length;
+         word = line_word(&line))
         if (!library_of_word_read(reader, word)) return false;
     return true;
 }

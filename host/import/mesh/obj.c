@@ -1,34 +1,29 @@
 // Wavefront OBJ (Alias|Wavefront, Advanced Visualizer manual, appendix B, 1995): polygons, and the materials
 // of its MTL files.
 #include "host/base/array.h"
+#include "host/import/line.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/mtl.h"
-#include "host/import/mesh/scan.h"
 
 #include <stdlib.h>
 
 typedef struct {
     MeshDraft *draft;
-    Scan scan;
+    Line line;
     UnusedWords unused;
     bool has_colors;
     bool lacks[DRAFT_PART_COUNT]; // whether a missing index was warned of
     ObjMaterials materials;
 } ObjReader;
 
-static size_t offset_of(const ObjReader *reader)
-{
-    return scan_offset(&reader->scan);
-}
-
 // Reads a position. A fourth number is homogeneous, and further ones are a color.
 static bool position_read(ObjReader *reader)
 {
     MeshDraft *draft = reader->draft;
     double numbers[4] = {0};
-    const int count = scan_numbers(&reader->scan, numbers, 4);
-    const bool at_end = !scan_more(&reader->scan);
-    const size_t offset = offset_of(reader);
+    const int count = line_try_numbers(&reader->line, numbers, 4);
+    const bool at_end = !line_has_word(&reader->line);
+    const size_t offset = line_offset(&reader->line);
     Vector3 position = {numbers[0], numbers[1], numbers[2]};
     if (count == 4 && at_end) {
         if (numbers[3] == 0) return draft_fails(draft, offset, "the fourth number of a vertex is 0");
@@ -43,8 +38,8 @@ static bool position_read(ObjReader *reader)
 static bool uv_read(ObjReader *reader)
 {
     double numbers[3] = {NAN, 0, 0};
-    const int count = scan_numbers(&reader->scan, numbers, 3);
-    if (count < 2 && scan_more(&reader->scan)) numbers[count] = NAN;
+    const int count = line_try_numbers(&reader->line, numbers, 3);
+    if (count < 2 && line_has_word(&reader->line)) numbers[count] = NAN;
     draft_add_uv(reader->draft, numbers[0], numbers[1]);
     return true;
 }
@@ -52,7 +47,7 @@ static bool uv_read(ObjReader *reader)
 static bool normal_read(ObjReader *reader)
 {
     double numbers[3] = {0};
-    const int count = scan_numbers(&reader->scan, numbers, 3);
+    const int count = line_try_numbers(&reader->line, numbers, 3);
     const Vector3 normal = {numbers[0], numbers[1], numbers[2]};
     array_push(reader->draft->normals, count == 3 ? normal : vector_all(NAN));
     return true;
@@ -60,8 +55,8 @@ static bool normal_read(ObjReader *reader)
 
 static bool corner_fails(ObjReader *reader, const char *start)
 {
-    reader->scan.at = start;
-    const Word word = scan_word(&reader->scan);
+    reader->line.at = start;
+    const Word word = line_word(&reader->line);
     return draft_fails(reader->draft, word.offset, "'%.*s' is not a corner of a face", WORD_TEXT(word));
 }
 
@@ -87,7 +82,7 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
 static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
 {
     enum { DIGITS_MAX = 18 };
-    const char *at = reader->scan.at, *start = at;
+    const char *at = reader->line.at, *start = at;
     const bool is_negative = *at == '-';
     if (*at == '-' || *at == '+') at++;
     const char *first = at;
@@ -95,8 +90,8 @@ static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
     for (; (unsigned char)(*at - '0') < 10 && at - first < DIGITS_MAX; at++)
         index = 10 * index + (*at - '0');
     if (at == first || (unsigned char)(*at - '0') < 10) return corner_fails(reader, corner);
-    reader->scan.at = at;
-    const size_t offset = (size_t)(start - reader->scan.start);
+    reader->line.at = at;
+    const size_t offset = (size_t)(start - reader->line.text);
     const int64_t count = (int64_t)draft_part_count(reader->draft, part);
     const int64_t from_0 = is_negative ? count - index : index - 1;
     if (from_0 < 0 || from_0 >= DRAFT_NONE || (is_negative && index == 0))
@@ -109,41 +104,41 @@ static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
 static bool corner_read(ObjReader *reader)
 {
     static const DraftPart parts[] = {DRAFT_UV, DRAFT_NORMAL};
-    const char *start = reader->scan.at;
+    const char *start = reader->line.at;
     const size_t corner = reader->draft->corners[DRAFT_POSITION].count;
     if (!index_read(reader, DRAFT_POSITION, start)) return false;
     for (int i = 0; i < 2; i++) {
         DraftIndices *indices = &reader->draft->corners[parts[i]];
-        const bool has_slash = *reader->scan.at == '/';
-        if (has_slash) reader->scan.at++;
-        if (has_slash && *reader->scan.at != '/' && !scan_is_word_end(reader->scan.at)) {
+        const bool has_slash = *reader->line.at == '/';
+        if (has_slash) reader->line.at++;
+        if (has_slash && *reader->line.at != '/' && !word_ends_at(&reader->line, reader->line.at)) {
             if (indices->count == 0) draft_begin_part(reader->draft, parts[i], corner);
             if (!index_read(reader, parts[i], start)) return false;
         } else if (indices->count > 0) {
             array_push(*indices, DRAFT_NONE);
         }
     }
-    return scan_is_word_end(reader->scan.at) || corner_fails(reader, start);
+    return word_ends_at(&reader->line, reader->line.at) || corner_fails(reader, start);
 }
 
 static bool face_read(ObjReader *reader)
 {
-    const size_t offset = offset_of(reader);
-    while (scan_more(&reader->scan))
+    const size_t offset = line_offset(&reader->line);
+    while (line_has_word(&reader->line))
         if (!corner_read(reader)) return false;
     return draft_end_face(reader->draft, offset);
 }
 
 static bool material_read(ObjReader *reader)
 {
-    const ObjMaterial material = {scan_rest(&reader->scan), reader->draft->face_start};
+    const ObjMaterial material = {line_rest(&reader->line), reader->draft->face_start};
     array_push(reader->materials.used, material);
     return true;
 }
 
 static bool library_read(ObjReader *reader)
 {
-    array_push(reader->materials.libraries, scan_rest(&reader->scan));
+    array_push(reader->materials.libraries, line_rest(&reader->line));
     return true;
 }
 
@@ -167,7 +162,7 @@ static const struct {
 
 static bool line_read(ObjReader *reader)
 {
-    const Word word = scan_word(&reader->scan);
+    const Word word = line_word(&reader->line);
     if (word.length == 0) return true;
     for (size_t i = 0; i < COUNT_OF(statements); i++)
         if (word_is(word, statements[i].word)) return !statements[i].read || statements[i].read(reader);
@@ -177,15 +172,14 @@ static bool line_read(ObjReader *reader)
 
 bool obj_read(MeshDraft *draft)
 {
-    const Source *source = &draft->source;
-    ObjReader reader = {.draft = draft, .scan = scan_open(source)};
+    ObjReader reader = {.draft = draft, .line = line_first_of_mesh(&draft->report)};
     draft->first_index = 1;
-    bool read = scan_is_text(&reader.scan, &draft->report);
+    bool read = line_is_text(&reader.line);
     if (read) {
         do {
-            stage_set(draft->stage, offset_of(&reader));
+            stage_set(draft->stage, line_offset(&reader.line));
             read = line_read(&reader);
-        } while (read && scan_line(&reader.scan));
+        } while (read && line_next(&reader.line));
     }
     if (read) draft_drop_missing(draft);
     if (read && draft->import->own_materials) obj_materials_read(draft, &reader.materials);

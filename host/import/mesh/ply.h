@@ -30,7 +30,6 @@ typedef struct {
     ARRAY_OF(PlyProperty) properties; // of all elements, in their order
 } PlyHeader;
 
-// Reads the header's lines, after which line->next is the first byte of the body. Returns false with an error
-// if there is no valid header.
+// Reads the header, up to its last line. Returns false with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, Line *line);
 void ply_header_free(PlyHeader *header);

@@ -67,7 +67,7 @@ static bool type_read(Line *line, Word word, const PlyType **type)
 static bool property_read(PlyHeader *header, Line *line)
 {
     if (header->elements.count == 0)
-        return report_error(line->report, line->at, "a property before the first element");
+        return report_error(line->report, line_offset(line), "a property before the first element");
     PlyProperty property = {0};
     Word word = line_word(line);
     if (word_is(word, "list")) {
@@ -76,7 +76,8 @@ static bool property_read(PlyHeader *header, Line *line)
     }
     if (!type_read(line, word, &property.type)) return false;
     property.name = line_word(line);
-    if (property.name.length == 0) return report_error(line->report, line->at, "a property without a name");
+    if (property.name.length == 0)
+        return report_error(line->report, line_offset(line), "a property without a name");
     array_push(header->properties, property);
     header->elements.items[header->elements.count - 1].property_count++;
     return true;
@@ -102,14 +103,13 @@ bool ply_header_read(PlyHeader *header, Line *line)
     const Source *source = line->report->source;
     if (source->length < 3 || strncasecmp(source->bytes, "ply", 3) != 0)
         return report_error(line->report, 0, "not a PLY file, which starts with a line 'ply'");
-    line_next(line);
     while (line_next(line)) {
         if (is_end_of_header(*line))
             return header->format != PLY_NO_FORMAT ||
                    report_error(line->report, line->start, "the header lacks its format");
         if (!header_line_read(header, line)) return false;
     }
-    return report_error(line->report, line->next, "the header lacks its end, a line 'end_header'");
+    return report_error(line->report, source->length, "the header lacks its end, a line 'end_header'");
 }
 
 void ply_header_free(PlyHeader *header)

@@ -28,7 +28,7 @@ typedef ARRAY_OF(double) Numbers;
 typedef struct {
     PlyHeader header;
     MeshDraft *draft;
-    Line line;                 // of the row, in text; a binary file is read from line.next on
+    Line line;                 // of the row, in text; a binary file is read from line.at on
     const PlyElement *element; // of the current row, and the row's index
     size_t row;
     ARRAY_OF(PlyRole) roles; // of the element's properties
@@ -116,16 +116,10 @@ static bool is_binary(const PlyReader *reader)
     return reader->header.format != PLY_ASCII;
 }
 
-// Returns the offset of the read position.
-static size_t place_of(const PlyReader *reader)
-{
-    return is_binary(reader) ? reader->line.next : reader->line.at;
-}
-
 static bool value_missing(PlyReader *reader, const PlyProperty *property)
 {
     Word element = reader->element->name;
-    return draft_fails(reader->draft, place_of(reader), "%.*s %zu (from 0) lacks its '%.*s'",
+    return draft_fails(reader->draft, line_offset(&reader->line), "%.*s %zu (from 0) lacks its '%.*s'",
                        WORD_TEXT(element), reader->row, WORD_TEXT(property->name));
 }
 
@@ -166,14 +160,13 @@ static bool real_read(const char **text, const char *end, double *value)
 // Reads the line's next word as a number of the type. Sets *is_there to whether the line has one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
-    const char *bytes = reader->draft->source.bytes;
-    const char *at = bytes + line_skip_blanks(&reader->line), *end = bytes + reader->line.end;
-    *is_there = at < end;
-    if (at == end) return true;
+    *is_there = line_has_word(&reader->line);
+    if (!*is_there) return true;
+    const char *at = reader->line.at, *end = reader->line.end;
     const bool read =
         type->kind == PLY_REAL ? real_read(&at, end, value) : whole_read(&at, end, type->kind, value);
-    if (read && (at == end || character_is_blank(*at))) {
-        reader->line.at = (size_t)(at - bytes);
+    if (read && word_ends_at(&reader->line, at)) {
+        reader->line.at = at;
         return true;
     }
     const Word word = line_word(&reader->line);
@@ -183,12 +176,12 @@ static bool word_read(PlyReader *reader, const PlyType *type, double *value, boo
 
 static size_t bytes_left(const PlyReader *reader)
 {
-    return reader->draft->source.length - reader->line.next;
+    return (size_t)(reader->line.end - reader->line.at);
 }
 
 static double binary_number(const PlyReader *reader, const PlyType *type)
 {
-    const unsigned char *bytes = (const unsigned char *)reader->draft->source.bytes + reader->line.next;
+    const unsigned char *bytes = (const unsigned char *)reader->line.at;
     uint64_t bits = 0, end = 1; // of whole numbers' bits
     for (size_t i = 0; i < type->size; i++, end <<= 8)
         bits = bits << 8 | bytes[reader->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
@@ -209,7 +202,7 @@ static bool value_read(PlyReader *reader, const PlyType *type, double *value, bo
     *is_there = bytes_left(reader) >= type->size;
     if (!*is_there) return true;
     *value = binary_number(reader, type);
-    reader->line.next += type->size;
+    reader->line.at += type->size;
     return true;
 }
 
@@ -238,8 +231,7 @@ static bool is_count(double number)
 static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *numbers)
 {
     double count;
-    if (!is_binary(reader)) line_skip_blanks(&reader->line);
-    const size_t start = place_of(reader);
+    const size_t start = is_binary(reader) ? line_offset(&reader->line) : line_word_offset(&reader->line);
     if (!number_next(reader, property, property->count_type, &count)) return false;
     if (is_binary(reader)) {
         const size_t most = bytes_left(reader) / property->type->size;
@@ -267,7 +259,7 @@ static bool property_read(PlyReader *reader, size_t index)
                          : role == ROLE_CORNER_UVS ? &reader->corner_uvs
                                                    : NULL);
     if (role <= ROLE_Z && !is_binary(reader) && !reader->unread) {
-        const size_t start = line_skip_blanks(&reader->line);
+        const size_t start = line_word_offset(&reader->line);
         if (!number_next(reader, property, property->type, &reader->numbers[role])) return false;
         if (isnan(reader->numbers[role])) reader->unread = start;
         return true;
@@ -279,8 +271,9 @@ static bool property_read(PlyReader *reader, size_t index)
 static bool row_start(PlyReader *reader)
 {
     return line_next_filled(&reader->line) ||
-           draft_fails(reader->draft, reader->line.next, "the file ends before %.*s %zu (from 0) of %zu",
-                       WORD_TEXT(reader->element->name), reader->row, reader->element->count);
+           draft_fails(reader->draft, reader->draft->source.length,
+                       "the file ends before %.*s %zu (from 0) of %zu", WORD_TEXT(reader->element->name),
+                       reader->row, reader->element->count);
 }
 
 static bool vertex_add(PlyReader *reader)
@@ -297,7 +290,7 @@ static bool vertex_add(PlyReader *reader)
 static bool face_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->draft;
-    const size_t offset = place_of(reader), count = reader->corners.count;
+    const size_t offset = line_offset(&reader->line), count = reader->corners.count;
     if (reader->corner_uvs.count > 2 * count)
         return draft_fails(reader->draft, offset,
                            "face %zu (from 0) has %zu corner%s, but %zu texture coordinate%s", reader->row,
@@ -384,7 +377,7 @@ static bool element_read(PlyReader *reader, const PlyElement *element)
     // an element without properties has no rows, whatever its count
     const size_t count = element->property_count > 0 ? element->count : 0;
     for (reader->row = 0; reader->row < count; reader->row++) {
-        stage_set(draft->stage, reader->line.next);
+        stage_set(draft->stage, line_offset(&reader->line));
         if (!row_read(reader)) return false;
     }
     return true;
@@ -403,8 +396,9 @@ static void warn_of_rest(PlyReader *reader)
 
 bool ply_read(MeshDraft *draft)
 {
-    PlyReader reader = {.draft = draft, .line = {.report = &draft->report}};
+    PlyReader reader = {.draft = draft, .line = line_first(&draft->report, '\n')};
     bool read = ply_header_read(&reader.header, &reader.line) && elements_are_sound(&reader);
+    if (is_binary(&reader) && !line_next(&reader.line)) reader.line.at = reader.line.end; // no body
     for (size_t i = 0; read && i < reader.header.elements.count; i++)
         read = element_read(&reader, &reader.header.elements.items[i]);
     if (read) warn_of_rest(&reader);

@@ -1,16 +1,17 @@
 // STL (3D Systems, StereoLithography Interface Specification, 1989), in text or binary. Facet normals are
 // not read, since the triangles determine them.
 #include "host/base/array.h"
+#include "host/import/line.h"
 #include "host/import/mesh/draft.h"
-#include "host/import/mesh/scan.h"
 
+#include <string.h>
 #include <strings.h>
 
 enum { HEADER_SIZE = 84, FACET_SIZE = 50, FACET_VERTICES = 12, FACET_ATTRIBUTE = 48 };
 
 typedef struct {
     MeshDraft *draft;
-    Scan scan;
+    Line line;
     UnusedWords unused;
     size_t corner_count; // of the current facet
 } StlReader;
@@ -19,11 +20,11 @@ static bool vertex_read(StlReader *reader)
 {
     MeshDraft *draft = reader->draft;
     double numbers[3] = {0};
-    const bool is_read = scan_numbers(&reader->scan, numbers, 3) == 3;
+    const bool is_read = line_try_numbers(&reader->line, numbers, 3) == 3;
     array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
     reader->corner_count++;
     return draft_add_vertex(draft, (Vector3){numbers[0], numbers[1], numbers[2]},
-                            is_read ? 0 : scan_offset(&reader->scan));
+                            is_read ? 0 : line_offset(&reader->line));
 }
 
 static bool facet_end(StlReader *reader, size_t offset)
@@ -38,7 +39,7 @@ static bool facet_end(StlReader *reader, size_t offset)
 static bool line_read(StlReader *reader)
 {
     static const char *const known[] = {"facet", "outer", "solid", "endsolid"};
-    const Word word = scan_word(&reader->scan);
+    const Word word = line_word(&reader->line);
     if (word.length == 0) return true;
     if (word_is_in_any_case(word, "vertex")) return vertex_read(reader);
     if (word_is_in_any_case(word, "endloop") || word_is_in_any_case(word, "endfacet"))
@@ -51,14 +52,14 @@ static bool line_read(StlReader *reader)
 
 static bool text_read(MeshDraft *draft)
 {
-    const Source *source = &draft->source;
-    StlReader reader = {.draft = draft, .scan = scan_open(source)};
-    if (!scan_is_text(&reader.scan, &draft->report)) return false;
+    StlReader reader = {.draft = draft, .line = line_first_of_mesh(&draft->report)};
+    if (!line_is_text(&reader.line)) return false;
     do {
-        stage_set(draft->stage, scan_offset(&reader.scan));
+        stage_set(draft->stage, line_offset(&reader.line));
         if (!line_read(&reader)) return false;
-    } while (scan_line(&reader.scan));
-    return reader.corner_count == 0 || draft_fails(draft, source->length, "the file ends within a facet");
+    } while (line_next(&reader.line));
+    return reader.corner_count == 0 ||
+           draft_fails(draft, draft->source.length, "the file ends within a facet");
 }
 
 static float little_endian_float(const unsigned char *bytes)
@@ -115,15 +116,13 @@ static bool binary_read(MeshDraft *draft)
 
 // Returns whether a line before the first NUL starts with `solid`. Comments, blanks and a byte order mark may
 // precede it.
-static bool is_text(const Source *source)
+static bool is_text(MeshDraft *draft)
 {
-    Scan scan = scan_open(source);
-    if (source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0) scan.at += 3;
-    const size_t length = strnlen(scan.at, (size_t)(scan.end - scan.at));
-    for (scan.end = scan.at + length; scan.at < scan.end; scan_line(&scan)) {
-        scan_more(&scan);
-        if (strncasecmp(scan.at, "solid", strlen("solid")) == 0) return true;
-    }
+    Line line = line_first_of_mesh(&draft->report);
+    line.end = line.at + strnlen(line.at, (size_t)(line.end - line.at));
+    do
+        if (line_has_word(&line) && strncasecmp(line.at, "solid", strlen("solid")) == 0) return true;
+    while (line_next(&line));
     return false;
 }
 
@@ -134,5 +133,5 @@ bool stl_read(MeshDraft *draft)
     const Source *source = &draft->source;
     const bool is_exact =
         source->length >= HEADER_SIZE && source->length == HEADER_SIZE + facet_count(source) * FACET_SIZE;
-    return !is_exact && is_text(source) ? text_read(draft) : binary_read(draft);
+    return !is_exact && is_text(draft) ? text_read(draft) : binary_read(draft);
 }
