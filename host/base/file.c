@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 FileLock file_lock(int descriptor)
@@ -22,11 +23,15 @@ bool file_has_name(int descriptor, int folder, const char *name)
            named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
 }
 
-bool file_is_same(const char *path, const struct stat *other)
+FileId file_id(const char *path)
 {
     struct stat status;
-    return path && stat(path, &status) == 0 && status.st_dev == other->st_dev &&
-           status.st_ino == other->st_ino;
+    return path && stat(path, &status) == 0 ? (FileId){status.st_dev, status.st_ino} : (FileId){0};
+}
+
+bool file_is_same(FileId a, FileId b)
+{
+    return a.device == b.device && a.index == b.index && a.index > 0;
 }
 
 const char *file_base_name(const char *path)

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <stdbool.h>
-#include <sys/stat.h>
+#include <stdint.h>
 
 // FILE_REMOVED: the file is locked but had lost its last name before.
 typedef enum { FILE_LOCKED, FILE_BUSY, FILE_REMOVED } FileLock;
@@ -13,8 +13,15 @@ FileLock file_lock(int descriptor);
 // Returns whether the name in the open folder (or AT_FDCWD) is that of the open file, and not of another file
 // or a symbolic link.
 bool file_has_name(int descriptor, int folder, const char *name);
-// Returns whether a path, which may be NULL, leads to the file with this status.
-bool file_is_same(const char *path, const struct stat *other);
+// Identifies a file, under whatever name it is opened. It is zeroed for a missing file.
+typedef struct {
+    uint64_t device, index;
+} FileId;
+
+// Returns the identity of the file to which a path leads. The path may be NULL.
+FileId file_id(const char *path);
+// Returns whether both identities are those of one file, which is not missing.
+bool file_is_same(FileId a, FileId b);
 // Returns the part of a path after its last slash.
 const char *file_base_name(const char *path);
 // Opens the folder of a file. A folder that may be written but not listed is opened, but cannot be synced.

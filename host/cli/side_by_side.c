@@ -7,7 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum {
     COLUMN_SCENE,
@@ -192,10 +191,9 @@ static void side_by_side_close(SideBySide *side)
 // Returns whether the page would replace one of the reports, with a message.
 static bool page_overwrites(const char *page, char *const *paths, size_t count, MessageList *messages)
 {
-    struct stat target;
-    if (stat(page, &target) != 0) return false;
+    const FileId target = file_id(page);
     for (size_t i = 0; i < count; i++) {
-        if (!file_is_same(paths[i], &target)) continue;
+        if (!file_is_same(file_id(paths[i]), target)) continue;
         message_error(messages, "--html would overwrite the report '%s'", paths[i]);
         return true;
     }

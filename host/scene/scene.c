@@ -1,6 +1,5 @@
 #include "host/scene/scene.h"
 #include "host/base/array.h"
-#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/portable.h"
@@ -8,7 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #define SHAPE_NAME(NAME, name) name,
 const char *const shape_names[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_NAME) "oval", "mesh"};
@@ -232,15 +230,14 @@ void scene_add_override(Scene *scene, const char *name, const char *text)
 
 bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path)
 {
-    struct stat status;
-    if (stat(path, &status) != 0) return false;
-    bool is_read = file_is_same(scene_path, &status);
+    const FileId file = file_id(path);
+    bool is_read = file_is_same(file_id(scene_path), file);
     for (size_t i = 0; i < scene->included.count && !is_read; i++)
-        is_read = file_is_same(scene->included.items[i].path, &status);
+        is_read = file_is_same(file_id(scene->included.items[i].path), file);
     for (size_t i = 0; i < scene->textures.count && !is_read; i++)
-        is_read = file_is_same(scene->textures.items[i].path, &status);
+        is_read = file_is_same(file_id(scene->textures.items[i].path), file);
     for (size_t i = 0; i < scene->meshes.count && !is_read; i++)
-        is_read = file_is_same(scene->meshes.items[i].path, &status);
+        is_read = file_is_same(file_id(scene->meshes.items[i].path), file);
     return is_read;
 }
 

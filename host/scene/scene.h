@@ -3,6 +3,7 @@
 #pragma once
 
 #include "host/base/array.h"
+#include "host/base/file.h"
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/scene/affine.h"
@@ -276,9 +277,9 @@ typedef struct {
     uint32_t (*triangles)[3];
     uint32_t *materials; // one for each triangle, or NULL if all have the object's
     size_t triangle_count;
-    Bounds bounds;                    // of the vertices, if the mesh has instances
-    char *path;                       // the file it was read from, or NULL
-    uint64_t file_device, file_index; // identify that file, by whatever name it is opened
+    Bounds bounds; // of the vertices, if the mesh has instances
+    char *path;    // the file it was read from, or NULL
+    FileId file;
 } Mesh;
 
 // A file that a scene's file includes.

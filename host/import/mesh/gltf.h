@@ -16,8 +16,8 @@ typedef struct {
 typedef struct {
     const char *bytes;
     size_t length;
-    Text owned;            // the bytes if they were decoded or read, or empty if they are the GLB file's
-    uint64_t device, file; // of an external file
+    Text owned;  // the bytes if they were decoded or read, or empty if they are the GLB file's
+    FileId file; // of an external one
 } GltfBuffer;
 
 enum { UV_SETS_MAX = 255 };

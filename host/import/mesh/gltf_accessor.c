@@ -7,7 +7,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 // Bounds the lengths and offsets of a file. The sum of three fits a size_t.
 static const size_t size_max = SIZE_MAX >> 2;
@@ -77,17 +76,15 @@ static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri
     if (!path) return gltf_fails(gltf, uri, "must be a relative path or base64 data");
     scene_file_named(gltf->draft->import->options, path);
     const char *obstacle = file_obstacle(path);
-    struct stat status = {0};
     MessageList problems = {0};
-    if (!obstacle && stat(path, &status) == 0) {
+    if (!obstacle) {
+        const FileId file = file_id(path);
         for (size_t i = 0; i < gltf->buffer_count; i++)
-            if (gltf->buffers[i].bytes && gltf->buffers[i].device == status.st_dev &&
-                gltf->buffers[i].file == status.st_ino)
+            if (gltf->buffers[i].bytes && file_is_same(gltf->buffers[i].file, file))
                 *buffer = (GltfBuffer){.bytes = gltf->buffers[i].bytes, .length = gltf->buffers[i].length};
         if (!buffer->bytes && !text_read_file(&buffer->owned, path, &problems))
             obstacle = problems.items[0].text;
-        buffer->device = status.st_dev;
-        buffer->file = status.st_ino;
+        buffer->file = file;
     }
     if (obstacle) gltf_fails(gltf, uri, "cannot read '%.100s': %s", path, obstacle);
     message_list_free(&problems);

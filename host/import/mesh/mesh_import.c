@@ -6,7 +6,6 @@
 
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 static bool (*reader_of(const char *path))(MeshDraft *draft)
 {
@@ -69,13 +68,9 @@ enum { COPIED_TRIANGLES_MAX = 1 << 24 };
 static bool copies_fit(MeshDraft *draft, Mesh *mesh)
 {
     Scene *scene = draft->scene;
-    struct stat status;
-    if (stat(draft->import->path, &status) != 0) return true;
-    mesh->file_device = status.st_dev;
-    mesh->file_index = status.st_ino;
+    mesh->file = file_id(draft->import->path);
     size_t i = scene->meshes.count;
-    while (i > 0 && (scene->meshes.items[i - 1].file_index != status.st_ino ||
-                     scene->meshes.items[i - 1].file_device != status.st_dev))
+    while (i > 0 && !file_is_same(scene->meshes.items[i - 1].file, mesh->file))
         i--;
     if (i == 0) return true;
     const size_t count = scene->copied_triangle_count + mesh->triangle_count;

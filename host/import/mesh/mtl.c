@@ -9,7 +9,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 // A number and its place in the file. The value is NAN if it is not given.
 typedef struct {
@@ -37,7 +36,7 @@ typedef struct {
 typedef struct {
     MeshDraft *draft;
     ARRAY_OF(MtlMaterial) materials;
-    ARRAY_OF(struct stat) files; // that were read
+    ARRAY_OF(FileId) files; // that were read
     // of the current file
     const char *path;
     Report report;
@@ -270,20 +269,12 @@ static void line_read(MtlReader *reader)
     unused_record(&reader->unused, &reader->report, word, "is not used");
 }
 
-// Returns whether the file was read under any name.
-static bool file_was_read(const MtlReader *reader, const struct stat *file)
-{
-    for (size_t i = 0; i < reader->files.count; i++)
-        if (reader->files.items[i].st_dev == file->st_dev && reader->files.items[i].st_ino == file->st_ino)
-            return true;
-    return false;
-}
-
-// Reads an MTL file unless it was read before.
+// Reads an MTL file unless it was read before, under whatever name.
 static bool library_read(MtlReader *reader, const char *path)
 {
-    struct stat file = {0};
-    if (stat(path, &file) == 0 && file_was_read(reader, &file)) return true;
+    const FileId file = file_id(path);
+    for (size_t i = 0; i < reader->files.count; i++)
+        if (file_is_same(reader->files.items[i], file)) return true;
     scene_file_named(reader->draft->import->options, path);
     Text text = {0};
     MessageList ignored = {0}, messages = {0};

@@ -7,14 +7,12 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 // Bounds the number of included files, and so the depth of their includes.
 enum { FILES_MAX = 100 };
 
 typedef struct {
-    dev_t device;
-    ino_t index;
+    FileId file;
     bool is_open; // its own includes are being read
 } KnownFile;
 
@@ -22,7 +20,7 @@ typedef struct {
     YamlReader *reader;
     Source *last; // source of the latest file
     size_t base;  // base of the next file's offsets
-    // The first is the scene's, which is zeroed if it has none.
+    // The first is the scene's.
     KnownFile files[1 + FILES_MAX];
     size_t file_count;
     bool is_full; // more than FILES_MAX were named
@@ -216,15 +214,13 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
         return expected_report(reader, "include", "a YAML file (.yaml, .yml or .json)", node);
     char *path = yaml_read_path(reader, "include", node);
     const char *obstacle = file_obstacle(path);
-    struct stat status;
+    const FileId file = file_id(path);
     size_t known = 0;
-    bool is_read = !obstacle && stat(path, &status) == 0;
-    while (is_read && known < includes->file_count &&
-           (includes->files[known].device != status.st_dev || includes->files[known].index != status.st_ino))
+    bool is_read = !obstacle;
+    while (known < includes->file_count && !file_is_same(includes->files[known].file, file))
         known++;
-    if (!is_read) {
-        report_error(&reader->report, node->offset, "cannot read '%s': %s", path,
-                     obstacle ? obstacle : "it was removed");
+    if (obstacle) {
+        report_error(&reader->report, node->offset, "cannot read '%s': %s", path, obstacle);
     } else if (known < includes->file_count) {
         if (includes->files[known].is_open)
             is_read = report_error(&reader->report, node->offset, "recursive include of '%s'", path);
@@ -232,8 +228,7 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
         includes->is_full = true;
         is_read = report_error(&reader->report, node->offset, "more than %d included files", FILES_MAX);
     } else {
-        includes->files[includes->file_count++] =
-            (KnownFile){.device = status.st_dev, .index = status.st_ino};
+        includes->files[includes->file_count++] = (KnownFile){.file = file};
         is_read = file_read(includes, joined, path, node);
     }
     free(path);
@@ -280,10 +275,9 @@ static bool includes_read(Includes *includes, uint32_t root)
 
 bool yaml_include(YamlReader *reader, Source *source)
 {
-    struct stat status;
     Includes includes = {.reader = reader, .last = source, .base = source->length + 1, .file_count = 1};
     if (reader->tree.nodes.items->type != YAML_MAPPING) return true; // is reported with its keys
-    if (stat(source->file, &status) == 0) includes.files[0] = (KnownFile){status.st_dev, status.st_ino, true};
+    includes.files[0] = (KnownFile){file_id(source->file), true};
     return includes_read(&includes, 0) && reader->report.error_count == 0;
 }
 
