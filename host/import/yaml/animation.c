@@ -94,9 +94,7 @@ typedef struct {
 
 static bool read_ease(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    size_t i = 0;
-    while (i < EASE_COUNT && !yaml_is(&reader->tree, node, ease_names[i]))
-        i++;
+    const size_t i = name_find(NAMES_OF(ease_names), yaml_text(&reader->tree, node));
     if (i == EASE_COUNT) return expected_report(reader, field->name, "linear, smooth or step", node);
     *(Ease *)target = (Ease)i;
     return true;

@@ -7,10 +7,8 @@
 #include <string.h>
 #include <strings.h>
 
-enum {
-    FIELDS_MAX = 32,
-    LISTED_MAX = 20 // a message lists at most this many known words
-};
+// COMPARED_MAX bounds the cost of a wrong name in a hostile file. A message lists at most LISTED_MAX names.
+enum { FIELDS_MAX = 32, COMPARED_MAX = 1000, LISTED_MAX = 20 };
 
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
@@ -36,31 +34,53 @@ static const struct {
     {"texture", "image"},
 };
 
-// Returns the known word that `word` may stand for, or NULL.
-static const char *known_word(const char *word, const char *const *known, size_t known_count)
+bool node_has_type(YamlReader *reader, const YamlNode *node, YamlType type, const char *name)
 {
+    return node->type == type ||
+           expected_report(reader, name, type == YAML_SEQUENCE ? "a list" : "a mapping", node);
+}
+
+static const char *name_at(Names names, size_t index)
+{
+    return *(const char *const *)((const char *)names.items + index * names.size);
+}
+
+size_t name_find(Names names, const char *name)
+{
+    size_t index = 0;
+    while (index < names.count && strcmp(name_at(names, index), name) != 0)
+        index++;
+    return index;
+}
+
+// Returns the name that `word` may stand for, or NULL.
+static const char *name_meant(const char *word, Names names)
+{
+    const char *compared[COMPARED_MAX];
+    size_t count = 0;
     for (size_t i = 0; i < COUNT_OF(synonyms); i++)
-        for (size_t j = 0; j < known_count && !strcasecmp(word, synonyms[i].word); j++)
-            if (!strcmp(synonyms[i].known, known[j])) return known[j];
-    return strlen(word) <= WORD_SHOWN ? text_nearest(word, known, known_count) : NULL;
+        if (!strcasecmp(word, synonyms[i].word) && name_find(names, synonyms[i].known) < names.count)
+            return synonyms[i].known;
+    for (; count < COMPARED_MAX && count < names.count; count++)
+        compared[count] = name_at(names, count);
+    return strlen(word) <= WORD_SHOWN ? text_nearest(word, compared, count) : NULL;
 }
 
-void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count)
+void choices_describe(Text *text, const char *word, Names names)
 {
-    const char *meant = known_word(word, known, known_count);
+    const char *meant = name_meant(word, names);
     if (meant) text_appendf(text, ": did you mean '%.*s'?", WORD_SHOWN, meant);
-    if (known_count < 2 || known_count > LISTED_MAX) return;
+    if (names.count < 2 || names.count > LISTED_MAX) return;
     text_appendf(text, meant ? " The choices are " : "; the choices are ");
-    for (size_t i = 0; i < known_count; i++)
-        text_appendf(text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
+    for (size_t i = 0; i < names.count; i++)
+        text_appendf(text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, name_at(names, i));
 }
 
-bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
-                    size_t known_count)
+bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, Names names)
 {
     const char *word = yaml_text(&reader->tree, node);
     Text choices = {0};
-    choices_describe(&choices, word, known, known_count);
+    choices_describe(&choices, word, names);
     report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", type, WORD_SHOWN, word,
                  text_c(&choices));
     text_free(&choices);
@@ -80,31 +100,17 @@ void twice_report(YamlReader *reader, const char *type, const char *name, size_t
     free(place);
 }
 
-static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,
-                                 const Field *fields, size_t field_count)
+static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what, Names names)
 {
-    const char *known[FIELDS_MAX] = {NULL};
-    for (size_t i = 0; i < field_count; i++)
-        known[i] = fields[i].name;
     char type[64];
     snprintf(type, sizeof type, "%s key", what);
-    unknown_report(reader, key, type, known, field_count);
+    unknown_report(reader, key, type, names);
 }
 
 bool key_is_word(YamlReader *reader, const YamlNode *key)
 {
     if (key->type == YAML_SCALAR) return true;
     return report_error(&reader->report, key->offset, "a key must be a word");
-}
-
-// Returns the index of the field named by the key, or field_count.
-static size_t field_find(const YamlReader *reader, const YamlNode *key, const Field *fields,
-                         size_t field_count)
-{
-    size_t index = 0;
-    while (index < field_count && !yaml_is(&reader->tree, key, fields[index].name))
-        index++;
-    return index;
 }
 
 static Form field_forms(const Field *field)
@@ -132,7 +138,8 @@ static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *fi
 Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target)
 {
-    if (mapping->type != YAML_MAPPING) return expected_report(reader, what, "a mapping", mapping);
+    const Names names = {fields, field_count, sizeof *fields};
+    if (!node_has_type(reader, mapping, YAML_MAPPING, what)) return false;
     size_t errors_before = reader->report.error_count;
     bool seen[FIELDS_MAX] = {false};
     Form forms = FORM_ANY;
@@ -142,10 +149,10 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
          key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
         if (!key_is_word(reader, key)) continue;
-        size_t index = field_find(reader, key, fields, field_count);
+        size_t index = name_find(names, yaml_text(&reader->tree, key));
         const Field *field = &fields[index];
         if (index == field_count)
-            unknown_field_report(reader, key, what, fields, field_count);
+            unknown_field_report(reader, key, what, names);
         else if (seen[index])
             report_error(&reader->report, key->offset, "'%s' is given twice", field->name);
         else if (form_narrow(reader, key, field, fields, seen, &forms))

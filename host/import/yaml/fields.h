@@ -105,9 +105,22 @@ bool is_color_text(const char *text);
 void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before);
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
-// Appends the known word that `word` may stand for, if any, and the list of known words unless it is long.
-void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count);
-// Reports `unknown type 'word'`, with a suggestion if a known word is similar or means the same, and with
-// the list of known words unless it is long. Returns false.
-bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
-                    size_t known_count);
+// Returns whether the value called `name` is a list or a mapping, as the type demands. Reports an error
+// otherwise.
+bool node_has_type(YamlReader *reader, const YamlNode *node, YamlType type, const char *name);
+
+// Names that begin `count` items of `size` bytes.
+typedef struct {
+    const void *items;
+    size_t count, size;
+} Names;
+
+#define NAMES_OF(array) ((Names){(array), COUNT_OF(array), sizeof *(array)})
+
+// Returns the index of a name, or the count if it is unknown.
+size_t name_find(Names names, const char *name);
+// Appends the name that `word` may stand for, if any, and the list of names unless it is long.
+void choices_describe(Text *text, const char *word, Names names);
+// Reports `unknown type 'word'`, with a suggestion if a name is similar or means the same, and with the list
+// of names unless it is long. Returns false.
+bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, Names names);

@@ -97,11 +97,9 @@ static Definition definition_move(YamlReader *reader, const YamlNode *key, size_
     return definition;
 }
 
-static const Definition *definition_find(const YamlReader *reader, const char *name)
+static Names definition_names(const YamlReader *reader)
 {
-    for (size_t i = 0; i < reader->definitions.count; i++)
-        if (strcmp(reader->definitions.items[i].name, name) == 0) return &reader->definitions.items[i];
-    return NULL;
+    return (Names){reader->definitions.items, reader->definitions.count, sizeof(Definition)};
 }
 
 // Returns the cost of a copy. A box counts as four objects, because it may become a mesh of 12 triangles.
@@ -116,10 +114,7 @@ static size_t definition_cost(const Definition *definition)
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 {
     static const Field fields[] = {{"objects", read_node, 0, REQUIRED}};
-    if (node->type != YAML_MAPPING) {
-        expected_report(reader, "define", "a mapping", node);
-        return;
-    }
+    if (!node_has_type(reader, node, YAML_MAPPING, "define")) return;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, node); key && !report_is_full(&reader->report);
          key = yaml_next(&reader->tree, value)) {
@@ -128,9 +123,9 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         const char *name = yaml_text(&reader->tree, key);
         const size_t first_object = reader->scene->objects.count;
         const YamlNode *objects = NULL;
-        const Definition *known = definition_find(reader, name);
-        if (known) {
-            twice_report(reader, "definition", name, key->offset, known->offset);
+        const size_t known = name_find(definition_names(reader), name);
+        if (known < reader->definitions.count) {
+            twice_report(reader, "definition", name, key->offset, reader->definitions.items[known].offset);
             continue;
         }
         if (reader->definitions.count == DEFINITIONS_MAX) {
@@ -172,14 +167,10 @@ static const Definition *definition_named(YamlReader *reader, const YamlNode *no
         expected_report(reader, "of", "a name of 'define'", node);
         return NULL;
     }
-    const Definition *definition = definition_find(reader, yaml_text(&reader->tree, node));
-    if (definition) return definition;
-    const size_t count = reader->definitions.count;
-    const char **names = memory_allocate(count, sizeof *names);
-    for (size_t i = 0; i < count; i++)
-        names[i] = reader->definitions.items[i].name;
-    unknown_report(reader, node, "definition", names, count);
-    free(names);
+    const Names names = definition_names(reader);
+    const size_t index = name_find(names, yaml_text(&reader->tree, node));
+    if (index < names.count) return &reader->definitions.items[index];
+    unknown_report(reader, node, "definition", names);
     return NULL;
 }
 

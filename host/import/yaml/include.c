@@ -54,10 +54,7 @@ static YamlNode *node_at(const Includes *includes, uint32_t index)
 // Returns the index of the section that a key names, or SECTION_COUNT.
 static size_t section_of(const Includes *includes, uint32_t key)
 {
-    size_t i = 0;
-    while (i < SECTION_COUNT && !yaml_is(&includes->reader->tree, node_at(includes, key), sections[i].name))
-        i++;
-    return i;
+    return name_find(NAMES_OF(sections), yaml_text(&includes->reader->tree, node_at(includes, key)));
 }
 
 static Joined joined_open(const Includes *includes, uint32_t root)
@@ -116,10 +113,8 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
     const uint32_t value = node_at(includes, key)->next, existing = joined->values[section];
     const YamlType type = sections[section].type;
     const bool is_joined = type != YAML_SCALAR;
-    if (is_joined && node_at(includes, value)->type != type) {
-        expected_report(reader, sections[section].name, type == YAML_SEQUENCE ? "a list" : "a mapping",
-                        node_at(includes, value));
-    } else if (existing == 0) {
+    if (is_joined && !node_has_type(reader, node_at(includes, value), type, sections[section].name)) return;
+    if (existing == 0) {
         joined->values[section] = value;
         if (is_joined && node_at(includes, value)->child_count > 0) {
             yaml_children_unshare(&reader->tree, value);
@@ -177,8 +172,7 @@ static bool text_parse(Includes *includes, Source *source, uint32_t *root)
     const bool is_read = yaml_tree_read(&reader->tree, &report, includes->base, reader->options->stage);
     includes->base += source->length + 1;
     report_include(&reader->report, &report);
-    if (!is_read || node_at(includes, *root)->type == YAML_MAPPING) return is_read;
-    return expected_report(reader, "scene", "a mapping", node_at(includes, *root));
+    return is_read && node_has_type(reader, node_at(includes, *root), YAML_MAPPING, "scene");
 }
 
 static bool includes_read(Includes *includes, uint32_t root);

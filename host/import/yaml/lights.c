@@ -160,20 +160,15 @@ static bool light_read(YamlReader *reader, const YamlNode *item)
 {
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return false;
-    const char *names[COUNT_OF(light_types)];
-    size_t row = COUNT_OF(light_types);
-    for (size_t i = 0; i < COUNT_OF(light_types); i++) {
-        names[i] = light_types[i].name;
-        if (yaml_is(&reader->tree, key, names[i])) row = i;
-    }
-    if (row == COUNT_OF(light_types))
-        return unknown_report(reader, key, "light", names, COUNT_OF(light_types));
+    const Names names = NAMES_OF(light_types);
+    const size_t row = name_find(names, yaml_text(&reader->tree, key));
+    if (row == names.count) return unknown_report(reader, key, "light", names);
     LightFields fields = {
         .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area.type = light_types[row].area},
         .intensity = 1,
     };
     Light *light = &fields.light;
-    const Form form = fields_read(reader, mapping, names[row], light_types[row].fields,
+    const Form form = fields_read(reader, mapping, light_types[row].name, light_types[row].fields,
                                   light_types[row].field_count, &fields);
     if (!form || (light->type == LIGHT_SPOT && !spot_finish(reader, mapping, form, light))) return false;
     const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1])),
@@ -191,10 +186,7 @@ static bool light_read(YamlReader *reader, const YamlNode *item)
 
 void yaml_read_lights(YamlReader *reader, const YamlNode *node)
 {
-    if (node->type != YAML_SEQUENCE) {
-        expected_report(reader, "lights", "a list", node);
-        return;
-    }
+    if (!node_has_type(reader, node, YAML_SEQUENCE, "lights")) return;
     for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
          item = yaml_next(&reader->tree, item))
         light_read(reader, item);

@@ -4,9 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Bounds the cost of wrong names in a hostile file.
-enum { NAMES_COMPARED = 1000 };
-
 static bool read_checker(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Items two_colors = {2, "two colors", read_color, sizeof(Color)};
@@ -80,14 +77,11 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
         return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
     if (node->type == YAML_MAPPING)
         return fields_read(reader, node, field->name, fields, COUNT_OF(fields), target);
-    const char *names[COUNT_OF(conductors)];
-    for (size_t i = 0; i < COUNT_OF(conductors); i++) {
-        names[i] = conductors[i].name;
-        if (!yaml_is(&reader->tree, node, names[i])) continue;
-        *(Conductor *)target = conductors[i].index;
-        return true;
-    }
-    return unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
+    const Names names = NAMES_OF(conductors);
+    const size_t row = name_find(names, yaml_text(&reader->tree, node));
+    if (row == names.count) return unknown_report(reader, node, field->name, names);
+    *(Conductor *)target = conductors[row].index;
+    return true;
 }
 
 // Returns the path of the node's file, which is the scene's for a value of --set.
@@ -121,21 +115,21 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
 {
     typedef struct {
         const YamlNode *file, *layer;
-    } Names;
+    } ImageNodes;
     static const Field fields[] = {
-        {"file", read_node, offsetof(Names, file), REQUIRED},
-        {"layer", read_node, offsetof(Names, layer)},
+        {"file", read_node, offsetof(ImageNodes, file), REQUIRED},
+        {"layer", read_node, offsetof(ImageNodes, layer)},
     };
-    Names names = {.file = node};
+    ImageNodes nodes = {.file = node};
     if (node->type == YAML_MAPPING &&
-        !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names))
+        !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &nodes))
         return false;
-    if (names.layer && !yaml_text(&reader->tree, names.layer)[0])
-        return expected_report(reader, "layer", "the name of a layer", names.layer);
-    char *path = yaml_read_path(reader, field->name, names.file);
+    if (nodes.layer && !yaml_text(&reader->tree, nodes.layer)[0])
+        return expected_report(reader, "layer", "the name of a layer", nodes.layer);
+    char *path = yaml_read_path(reader, field->name, nodes.file);
     if (!path) return false;
-    node = names.file;
-    const char *layer = names.layer ? yaml_text(&reader->tree, names.layer) : NULL;
+    node = nodes.file;
+    const char *layer = nodes.layer ? yaml_text(&reader->tree, nodes.layer) : NULL;
     const uint32_t texture = scene_add_texture(reader->scene, path, layer, content, node->offset);
     free(path);
     if (texture == 0)
@@ -258,10 +252,7 @@ static int name_matches(const void *word, const void *name)
 
 void yaml_read_materials(YamlReader *reader, const YamlNode *node)
 {
-    if (node->type != YAML_MAPPING) {
-        expected_report(reader, "materials", "a mapping", node);
-        return;
-    }
+    if (!node_has_type(reader, node, YAML_MAPPING, "materials")) return;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, node); key; key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
@@ -288,11 +279,8 @@ static bool unknown_material_report(YamlReader *reader, const YamlNode *node)
         return report_error(&reader->report, node->offset,
                             "unknown material '%s'; for the color write {color: %s%s%s}", text, quote, text,
                             quote);
-    const char *known[NAMES_COMPARED] = {NULL};
-    size_t known_count = 0;
-    for (; known_count < NAMES_COMPARED && known_count < reader->names.count; known_count++)
-        known[known_count] = reader->names.items[known_count].name;
-    return unknown_report(reader, node, "material", known, known_count);
+    const Names names = {reader->names.items, reader->names.count, sizeof(MaterialName)};
+    return unknown_report(reader, node, "material", names);
 }
 
 bool read_material(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -228,11 +228,9 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         yaml_read_mesh, yaml_read_group, yaml_read_instance};
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
-    size_t type = 0;
-    while (type < COUNT_OF(names) && !yaml_is(&reader->tree, key, names[type]))
-        type++;
+    const size_t type = name_find(NAMES_OF(names), yaml_text(&reader->tree, key));
     if (type == COUNT_OF(names))
-        unknown_report(reader, key, "shape", names, COUNT_OF(names));
+        unknown_report(reader, key, "shape", NAMES_OF(names));
     else if (type < SHAPE_OVAL)
         shape_read(reader, (ShapeType)type, mapping);
     else
@@ -241,10 +239,7 @@ static void object_read(YamlReader *reader, const YamlNode *item)
 
 void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress)
 {
-    if (list->type != YAML_SEQUENCE) {
-        expected_report(reader, "objects", "a list", list);
-        return;
-    }
+    if (!node_has_type(reader, list, YAML_SEQUENCE, "objects")) return;
     Stage *stage = shows_progress ? reader->options->stage : NULL;
     size_t done = 0, mesh_count = SIZE_MAX;
     for (const YamlNode *item = yaml_first(&reader->tree, list); item && !report_is_full(&reader->report);

@@ -93,7 +93,7 @@ static bool missing_report(const Path *path, const char *name, size_t start)
          key && known_count < NAMES_COMPARED; key = yaml_next(path->tree, yaml_next(path->tree, key)))
         if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
     Text choices = {0};
-    choices_describe(&choices, name, known, known_count);
+    choices_describe(&choices, name, (Names){known, known_count, sizeof *known});
     report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
                  text_c(&choices));
     text_free(&choices);
