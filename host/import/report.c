@@ -13,31 +13,37 @@ Report report_open(const Source *source, MessageList *messages)
     return (Report){.source = source, .messages = messages, .first = messages->count};
 }
 
-static void report_add(Report *report, MessageSeverity severity, size_t offset, const char *format,
-                       va_list arguments)
+// Counts a message, and returns whether it is within the limit.
+static bool message_fits(Report *report, MessageSeverity severity)
 {
-    char *text = text_format_list(format, arguments);
-    message_add_at(report->messages, severity, report->source, offset, "%s", text);
-    free(text);
+    size_t *count = severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
+    return (*count)++ < MESSAGES_MAX;
+}
+
+// Adds the formatted arguments after `format` of the function that uses it.
+#define REPORT(report, severity, offset, format)                                                             \
+    do {                                                                                                     \
+        char *text;                                                                                          \
+        if (!message_fits(report, severity)) break;                                                          \
+        ARGUMENTS_FORMAT(text, format);                                                                      \
+        message_add_at((report)->messages, severity, (report)->source, offset, "%s", text);                  \
+        free(text);                                                                                          \
+    } while (0)
+
+void report_message(Report *report, MessageSeverity severity, size_t offset, const char *format, ...)
+{
+    REPORT(report, severity, offset, format);
 }
 
 bool report_error(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->error_count++ >= MESSAGES_MAX) return false;
-    va_list arguments;
-    va_start(arguments, format);
-    report_add(report, MESSAGE_ERROR, offset, format, arguments);
-    va_end(arguments);
+    REPORT(report, MESSAGE_ERROR, offset, format);
     return false;
 }
 
 void report_warning(Report *report, size_t offset, const char *format, ...)
 {
-    if (report->warning_count++ >= MESSAGES_MAX) return;
-    va_list arguments;
-    va_start(arguments, format);
-    report_add(report, MESSAGE_WARNING, offset, format, arguments);
-    va_end(arguments);
+    REPORT(report, MESSAGE_WARNING, offset, format);
 }
 
 bool report_is_full(const Report *report)
@@ -119,9 +125,8 @@ void report_include(Report *report, Report *included)
     MessageList *from = included->messages, *to = &report->included;
     for (size_t i = 0; i < from->count; i++) {
         const Message *message = &from->items[i];
-        size_t *count = message->severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
         if (report_repeats(report, message->file, message->line, message->column, message->text) ||
-            (*count)++ >= MESSAGES_MAX)
+            !message_fits(report, message->severity))
             message_free(&from->items[i]);
         else
             array_push(*to, *message);

@@ -21,6 +21,9 @@ typedef struct {
 
 Report report_open(const Source *source, MessageList *messages);
 
+// Adds a message of the severity.
+void report_message(Report *report, MessageSeverity severity, size_t offset, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 // Reports an error and returns false.
 bool report_error(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -99,13 +99,8 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, uint32_t 
     MessageList problems = {0};
     const size_t offset = texture->offset;
     bool is_usable = texture->image.values || texture_read(texture, max_pixels, &problems);
-    for (size_t i = 0; i < problems.count; i++) {
-        const Message *message = &problems.items[i];
-        if (message->severity == MESSAGE_ERROR)
-            report_error(report, offset, "%s", message->text);
-        else
-            report_warning(report, offset, "%s", message->text);
-    }
+    for (size_t i = 0; i < problems.count; i++)
+        report_message(report, problems.items[i].severity, offset, "%s", problems.items[i].text);
     message_list_free(&problems);
     text_free(&texture->bytes);
     const Image *image = &texture->image;

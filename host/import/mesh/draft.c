@@ -10,24 +10,20 @@
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
 
-static void draft_report(const MeshDraft *draft, bool is_error, const char *text)
+static void draft_report(const MeshDraft *draft, MessageSeverity severity, const char *text)
 {
     const MeshImport *import = draft->import;
-    if (report_repeats(import->report, import->path, is_error, 0, text)) return;
-    if (import->offset == MESSAGE_WHOLE_FILE) // of a file that is the scene, which the message names
-        (is_error ? (void)report_error(import->report, import->offset, "%s", text)
-                  : report_warning(import->report, import->offset, "%s", text));
-    else if (is_error)
-        report_error(import->report, import->offset, "%s: %s", import->path, text);
-    else
-        report_warning(import->report, import->offset, "%s: %s", import->path, text);
+    const bool is_scene = import->offset == MESSAGE_WHOLE_FILE; // whose path the report adds
+    if (!report_repeats(import->report, import->path, severity, 0, text))
+        report_message(import->report, severity, import->offset, "%s%s%s", is_scene ? "" : import->path,
+                       is_scene ? "" : ": ", text);
 }
 
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
 {
     char *text;
     ARGUMENTS_FORMAT(text, format);
-    draft_report(draft, true, text);
+    draft_report(draft, MESSAGE_ERROR, text);
     free(text);
     return false;
 }
@@ -36,7 +32,7 @@ void draft_warn(MeshDraft *draft, const char *format, ...)
 {
     char *text;
     ARGUMENTS_FORMAT(text, format);
-    draft_report(draft, false, text);
+    draft_report(draft, MESSAGE_WARNING, text);
     free(text);
 }
 
