@@ -111,6 +111,11 @@ bool range_holds(const Range *range, double value)
                        : value >= range->low && value <= range->high;
 }
 
+bool color_is_sound(Vector3 color)
+{
+    return vector_is_within(color, NUMBER_MAX) && vector_is_zero(vector_min(color, vector_all(0)));
+}
+
 int word_shown(Word word)
 {
     return word.length < WORD_SHOWN ? (int)word.length : WORD_SHOWN;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/import/report.h"
+#include "host/scene/vector.h"
 #include <stddef.h>
 
 // Larger magnitudes are rejected and smaller ones are read as 0, so that no product of a few numbers
@@ -36,6 +37,8 @@ typedef struct {
 extern const Range range_positive, range_not_negative, range_unit, range_byte, range_half_turn, range_pixels;
 
 bool range_holds(const Range *range, double value);
+// Returns whether each component is 0 or more and at most NUMBER_MAX.
+bool color_is_sound(Vector3 color);
 
 // Reads the number called `name` from a whole word. Reports an error and returns false if it is invalid. A
 // `range` of NULL allows any number.

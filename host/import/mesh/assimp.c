@@ -64,12 +64,6 @@ static Affine affine_of_node(const struct aiMatrix4x4 *m)
         {{m->a1, m->a2, m->a3, m->a4}, {m->b1, m->b2, m->b3, m->b4}, {m->c1, m->c2, m->c3, m->c4}}};
 }
 
-static bool color_is_sound(const struct aiColor4D *color)
-{
-    return color->r >= 0 && color->r <= NUMBER_MAX && color->g >= 0 && color->g <= NUMBER_MAX &&
-           color->b >= 0 && color->b <= NUMBER_MAX;
-}
-
 static void warn_default(const Importer *importer, const char *what)
 {
     struct aiString name = {0};
@@ -85,7 +79,8 @@ static Color color_of(const Importer *importer, const char *key, unsigned type, 
     struct aiColor4D color;
     if (aiGetMaterialColor(importer->material, key, type, index, &color) != aiReturn_SUCCESS)
         return otherwise;
-    if (color_is_sound(&color)) return (Color){color.r, color.g, color.b};
+    const Color read = {color.r, color.g, color.b};
+    if (color_is_sound(read)) return read;
     warn_default(importer, "color");
     return otherwise;
 }

@@ -191,11 +191,6 @@ static bool number_is_sound(double number)
     return number >= 0 && number <= NUMBER_MAX;
 }
 
-static bool color_is_sound(Color color)
-{
-    return number_is_sound(color.x) && number_is_sound(color.y) && number_is_sound(color.z);
-}
-
 // Sets `textures` to the scene's index of each texture. Memory grows only with the bytes that arrive.
 static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
                           uint32_t textures[SCENE_TEXTURES_MAX])

@@ -112,6 +112,13 @@ static inline void draft_add_uv(MeshDraft *draft, double u, double v)
     uv[1] = v;
 }
 
+// Returns the number in 4 bytes, of which the first is the least significant.
+static inline uint32_t little_endian_at(const char *bytes)
+{
+    const unsigned char *byte = (const unsigned char *)bytes;
+    return (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
+}
+
 static inline bool draft_has(const MeshDraft *draft, DraftPart part)
 {
     return draft->is_shared[part] || draft->corners[part].count > 0;

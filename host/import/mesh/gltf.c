@@ -227,12 +227,6 @@ static bool json_read(Gltf *gltf, const char *text, size_t length, size_t offset
     return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "not a JSON object");
 }
 
-static uint32_t word_at(const char *bytes)
-{
-    const unsigned char *byte = (const unsigned char *)bytes;
-    return (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
-}
-
 // Reads a GLB file, which has a header of 12 bytes and then chunks of a length, a type and bytes. The first
 // chunk is JSON and the optional second one BIN.
 static bool glb_read(Gltf *gltf, const Source *source)
@@ -241,12 +235,12 @@ static bool glb_read(Gltf *gltf, const Source *source)
     MeshDraft *draft = gltf->draft;
     draft->places = DRAFT_BYTES;
     if (source->length < HEADER_BYTES + CHUNK_BYTES) return draft_refuse(draft, "too short for a GLB file");
-    if (word_at(source->bytes + 4) != 2)
-        return draft_fails(draft, 4, "GLB version %u is not read; glint reads 2", word_at(source->bytes + 4));
+    const uint32_t version = little_endian_at(source->bytes + 4);
+    if (version != 2) return draft_fails(draft, 4, "GLB version %u is not read; glint reads 2", version);
     size_t at = HEADER_BYTES;
     for (int i = 0; i < 2 && source->length - at >= CHUNK_BYTES; i++) {
-        const size_t length = word_at(source->bytes + at);
-        const uint32_t type = word_at(source->bytes + at + 4);
+        const size_t length = little_endian_at(source->bytes + at);
+        const uint32_t type = little_endian_at(source->bytes + at + 4);
         if (length > source->length - at - CHUNK_BYTES)
             return draft_fails(draft, at, "the file ends within a chunk of %zu bytes", length);
         const char *bytes = source->bytes + at + CHUNK_BYTES;

@@ -62,10 +62,9 @@ static bool text_read(MeshDraft *draft)
            draft_fails(draft, draft->source.length, "the file ends within a facet");
 }
 
-static float little_endian_float(const unsigned char *bytes)
+static float float_at(const char *bytes)
 {
-    const uint32_t bits =
-        bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+    const uint32_t bits = little_endian_at(bytes);
     float number;
     memcpy(&number, &bits, sizeof number);
     return number;
@@ -73,8 +72,7 @@ static float little_endian_float(const unsigned char *bytes)
 
 static size_t facet_count(const Source *source)
 {
-    const unsigned char *bytes = (const unsigned char *)source->bytes + HEADER_SIZE - 4;
-    return bytes[0] | (size_t)bytes[1] << 8 | (size_t)bytes[2] << 16 | (size_t)bytes[3] << 24;
+    return little_endian_at(source->bytes + HEADER_SIZE - 4);
 }
 
 static bool binary_read(MeshDraft *draft)
@@ -95,13 +93,12 @@ static bool binary_read(MeshDraft *draft)
     for (size_t i = 0; i < count; i++) {
         const size_t offset = HEADER_SIZE + i * FACET_SIZE;
         stage_set(draft->stage, offset);
-        const unsigned char *facet = (const unsigned char *)source->bytes + offset;
+        const char *facet = source->bytes + offset;
         for (size_t corner = 0; corner < 3; corner++) {
-            const unsigned char *bytes = facet + FACET_VERTICES + 12 * corner;
+            const char *bytes = facet + FACET_VERTICES + 12 * corner;
             array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
             array_push(draft->positions,
-                       ((Vector3){little_endian_float(bytes), little_endian_float(bytes + 4),
-                                  little_endian_float(bytes + 8)}));
+                       ((Vector3){float_at(bytes), float_at(bytes + 4), float_at(bytes + 8)}));
         }
         has_attributes |= facet[FACET_ATTRIBUTE] != 0 || facet[FACET_ATTRIBUTE + 1] != 0;
         if (!draft_end_face(draft, offset)) return false;
