@@ -20,6 +20,10 @@ bool assimp_knows(const char *path);
 // Reads the file with assimp. Runs in the reading process.
 bool assimp_read(MeshDraft *draft);
 
+// assimp_reply.c
+
+// Writes what assimp_read has added to the draft, to its scene and to its messages.
+void assimp_reply_write(MeshDraft *draft, FILE *reply, bool is_read);
 // Reads the reply of a reading process and sets *read to the result of assimp_read there. Returns false if
 // the reply is incomplete or invalid.
 bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read);
