@@ -5,6 +5,7 @@
 #include "host/base/array.h"
 #include "host/base/text.h"
 
+#include <search.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -200,7 +201,6 @@ bool scene_read_dat(Scene *scene, const Source *source, const SceneOptions *opti
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block 'camera'");
     }
-    free(reader.textures.items);
-    free(reader.slots);
+    tdestroy(reader.textures, free);
     return scene_finish(scene, &reader.report, options);
 }

@@ -6,20 +6,12 @@
 #include "host/import/load.h"
 
 typedef struct {
-    Word name;
-    uint64_t hash;
-    uint32_t material; // of the scene
-} DatTexture;
-
-typedef struct {
     Report report;
     Line line;
     Scene *scene;
     bool has_resolution, has_camera;
     bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
-    ARRAY_OF(DatTexture) textures;
-    uint32_t *slots; // of a hash table, each 1 + index of a texture, or 0 if free
-    size_t slot_count;
+    void *textures;  // by their names, as tsearch keeps them
 } DatReader;
 
 // Skips the next word if it is the keyword, and returns whether it is.

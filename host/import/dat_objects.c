@@ -167,20 +167,19 @@ bool dat_box(DatReader *reader)
 
 static bool vertices_read(DatReader *reader, Object *object)
 {
-    static const char *const names[] = {"v0", "v1", "v2"};
-    for (int i = 0; i < 3; i++)
-        if (!dat_vector(reader, names[i], &object->as.triangle.vertices[i])) return false;
-    return true;
+    Vector3 *vertices = object->as.triangle.vertices;
+    return dat_vector(reader, "v0", &vertices[0]) && dat_vector(reader, "v1", &vertices[1]) &&
+           dat_vector(reader, "v2", &vertices[2]);
 }
 
 static bool normals_read(DatReader *reader, Object *object)
 {
-    static const char *const names[] = {"n0", "n1", "n2"};
-    object->as.triangle.smooth = true;
-    for (int i = 0; i < 3; i++)
-        if (!dat_vector(reader, names[i], &object->as.triangle.normals[i])) return false;
-    for (int i = 0; i < 3; i++)
-        object->as.triangle.smooth &= !vector_is_zero(object->as.triangle.normals[i]);
+    Vector3 *normals = object->as.triangle.normals;
+    if (!dat_vector(reader, "n0", &normals[0]) || !dat_vector(reader, "n1", &normals[1]) ||
+        !dat_vector(reader, "n2", &normals[2]))
+        return false;
+    object->as.triangle.smooth =
+        !vector_is_zero(normals[0]) && !vector_is_zero(normals[1]) && !vector_is_zero(normals[2]);
     return true;
 }
 

@@ -1,10 +1,11 @@
 // Reads Tachyon's textures, which are materials, and their names.
 #include "host/base/array.h"
-#include "host/base/hash.h"
+#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/import/dat.h"
 
 #include <math.h>
+#include <search.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -150,42 +151,34 @@ bool dat_texture_body(DatReader *reader, Material *material)
     return word_is_in_any_case(word, "vcst") || function_read(reader);
 }
 
-static size_t slot_of(const DatReader *reader, Word name, uint64_t hash)
-{
-    size_t slot = (size_t)hash & (reader->slot_count - 1);
-    for (; reader->slots[slot]; slot = (slot + 1) & (reader->slot_count - 1)) {
-        const DatTexture *texture = &reader->textures.items[reader->slots[slot] - 1];
-        if (texture->hash == hash && words_equal(texture->name, name)) break;
-    }
-    return slot;
-}
+typedef struct {
+    Word name;
+    uint32_t material; // of the scene
+} NamedTexture;
 
-static void slots_grow(DatReader *reader)
+static int names_compare(const void *a, const void *b)
 {
-    reader->slot_count = reader->slot_count ? 2 * reader->slot_count : 64;
-    free(reader->slots);
-    reader->slots = memory_allocate_zeroed(reader->slot_count, sizeof *reader->slots);
-    for (size_t i = 0; i < reader->textures.count; i++) {
-        const DatTexture *texture = &reader->textures.items[i];
-        reader->slots[slot_of(reader, texture->name, texture->hash)] = (uint32_t)i + 1;
-    }
+    const Word *first = &((const NamedTexture *)a)->name, *second = &((const NamedTexture *)b)->name;
+    if (first->length != second->length) return first->length < second->length ? -1 : 1;
+    return memcmp(first->text, second->text, first->length);
 }
 
 // Adds a texture, which replaces any earlier texture of the same name.
 static void texture_add(DatReader *reader, Word name, uint32_t material)
 {
-    if (2 * reader->textures.count >= reader->slot_count) slots_grow(reader);
-    const DatTexture texture = {name, hash_bytes(HASH_START, name.text, name.length), material};
-    array_push(reader->textures, texture);
-    reader->slots[slot_of(reader, name, texture.hash)] = (uint32_t)reader->textures.count;
+    NamedTexture *added = memory_allocate(1, sizeof *added);
+    *added = (NamedTexture){name, material};
+    NamedTexture **known = tsearch(added, &reader->textures, names_compare);
+    if (!known) fault("out of memory: reading %s%s", reader->report.source->file, fault_limits());
+    if (*known == added) return;
+    (*known)->material = material;
+    free(added);
 }
 
 static uint32_t texture_find(DatReader *reader, Word name)
 {
-    const size_t slot =
-        reader->slot_count ? slot_of(reader, name, hash_bytes(HASH_START, name.text, name.length)) : 0;
-    if (reader->slot_count && reader->slots[slot])
-        return reader->textures.items[reader->slots[slot] - 1].material;
+    NamedTexture **known = tfind(&(NamedTexture){.name = name}, &reader->textures, names_compare);
+    if (known) return (*known)->material;
     dat_warn(reader, name.offset, "unknown texture '%.*s': white", WORD_TEXT(name));
     const Material white = dat_texture_default();
     const uint32_t material = scene_add_material(reader->scene, &white, "");
