@@ -1,6 +1,5 @@
 #include "host/import/line.h"
 #include "host/base/array.h"
-#include "host/import/place.h"
 
 #include <string.h>
 #include <strings.h>
@@ -9,7 +8,8 @@ Line line_first(Report *report, char comment)
 {
     const Source *source = report->source;
     const bool has_mark = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0;
-    Line line = {.report = report, .text = source->bytes, .comment = comment, .start = has_mark ? 3 : 0};
+    Line line = {
+        .report = report, .text = source->bytes, .start = has_mark ? 3 : 0, .number = 1, .comment = comment};
     line.at = line.text + line.start;
     line.end = line.text + source->length;
     return line;
@@ -49,6 +49,7 @@ bool line_next(Line *line)
     if (at == line->end) return false;
     line->at = at;
     line->start = line_offset(line);
+    line->number++;
     return true;
 }
 
@@ -241,15 +242,15 @@ bool line_vector(Line *line, const char *name, const Range *range, void *value)
 bool line_elements(Line *line, Scene *scene, void (*read)(void *reader), void *reader)
 {
     bool is_empty = true;
-    Places places = places_open(line->report->source, NULL);
     while (!report_is_full(line->report) && line_reach_word(line)) {
-        const size_t offset = line_offset(line);
+        const uint32_t number = line->number;
+        const size_t first = scene->objects.count;
         is_empty = false;
         read(reader);
-        places_record(&places, scene, offset);
+        for (size_t i = first; i < scene->objects.count; i++)
+            scene->objects.items[i].line = number;
         if (!line->spans_lines && !line_next(line)) break;
     }
-    places_close(&places);
     return !is_empty;
 }
 

@@ -9,6 +9,7 @@ typedef struct {
     const char *text, *end; // of the source
     const char *at;         // the read position
     size_t start;           // the line's offset
+    uint32_t number;        // the line's, from 1; a joined line counts as one
     char comment;           // the character that starts a comment, or '\n' for none
     bool joins_blanks;      // vectors may have blanks next to their commas
     bool joins_lines;       // a backslash at its end continues a line; a NUL follows the text
