@@ -193,44 +193,45 @@ static double component_read(const char *bytes, size_t type, bool is_normalized)
     }
 }
 
-// The layout of numbers in memory: `count` elements of `width` components.
+// `count` elements of `width` components, a stride apart from the offset on in a buffer view.
 typedef struct {
     size_t type, width, count, stride, offset;
     bool is_normalized;
-} Layout;
+    const char *bytes; // of the first element, NULL before elements_find
+} Elements;
 
 // Finds the elements in a buffer view. Returns false with an error if the view is too short.
-static bool elements_find(Gltf *gltf, const GltfItem *item, const Layout *layout, const char **bytes,
-                          size_t *stride)
+static bool elements_find(Gltf *gltf, const GltfItem *item, Elements *elements)
 {
     Source view = {.bytes = ""};
-    const size_t size = layout->width * component_size(layout->type);
-    *stride = size;
-    if (!gltf_view_read(gltf, item, "bufferView", &view, stride)) return false;
-    const uint64_t end = layout->offset + (uint64_t)(layout->count - 1) * *stride + size;
+    const size_t size = elements->width * component_size(elements->type);
+    elements->stride = size;
+    if (!gltf_view_read(gltf, item, "bufferView", &view, &elements->stride)) return false;
+    const uint64_t end = elements->offset + (uint64_t)(elements->count - 1) * elements->stride + size;
     if (end > view.length)
         return gltf_fails(gltf, item, "ends at byte %ju of a buffer view of %zu", (uintmax_t)end,
                           view.length);
-    *bytes = view.bytes + layout->offset;
+    elements->bytes = view.bytes + elements->offset;
     return true;
 }
 
-static void elements_read(const char *bytes, const Layout *layout, size_t stride, size_t row, double *values)
+static void element_read(const Elements *elements, size_t row, double *values)
 {
-    const size_t size = component_size(layout->type);
-    for (size_t i = 0; i < layout->width; i++)
-        values[i] = component_read(bytes + row * stride + i * size, layout->type, layout->is_normalized);
+    const char *bytes = elements->bytes + row * elements->stride;
+    const size_t size = component_size(elements->type);
+    for (size_t i = 0; i < elements->width; i++)
+        values[i] = component_read(bytes + i * size, elements->type, elements->is_normalized);
 }
 
 // Replaces the elements that a sparse accessor names.
-static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Layout *layout, GltfNumbers *numbers)
+static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *elements, GltfNumbers *numbers)
 {
     const GltfItem sparse = gltf_member(accessor, "sparse");
     if (!sparse.json) return true;
     const GltfItem indices = gltf_member(&sparse, "indices"), values = gltf_member(&sparse, "values");
-    Layout of_indices = {.width = 1}, of_values = *layout;
+    Elements of_indices = {.width = 1}, of_values = *elements;
     of_values.offset = 0;
-    if (!gltf_integer(gltf, &sparse, "count", 1, layout->count, &of_indices.count) ||
+    if (!gltf_integer(gltf, &sparse, "count", 1, elements->count, &of_indices.count) ||
         !gltf_integer(gltf, &indices, "componentType", GLTF_UINT8, GLTF_UINT32, &of_indices.type) ||
         !gltf_integer(gltf, &indices, "byteOffset", 0, size_max, &of_indices.offset) ||
         !gltf_integer(gltf, &values, "byteOffset", 0, size_max, &of_values.offset))
@@ -239,60 +240,54 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Layout *layo
     if (of_indices.count == 0 || component_size(of_indices.type) == 0 ||
         !json_object_get(indices.json, "bufferView") || !json_object_get(values.json, "bufferView"))
         return gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
-    const char *index_bytes = "", *value_bytes = "";
-    size_t index_stride = 0, value_stride = 0;
-    if (!elements_find(gltf, &indices, &of_indices, &index_bytes, &index_stride) ||
-        !elements_find(gltf, &values, &of_values, &value_bytes, &value_stride))
+    if (!elements_find(gltf, &indices, &of_indices) || !elements_find(gltf, &values, &of_values))
         return false;
     for (size_t i = 0; i < of_indices.count; i++) {
         double row = 0;
-        elements_read(index_bytes, &of_indices, index_stride, i, &row);
-        if (!(row >= 0 && row < (double)layout->count))
-            return gltf_fails(gltf, &indices, "element %zu names %.0f; there are %zu", i, row, layout->count);
-        elements_read(value_bytes, &of_values, value_stride, i,
-                      numbers->items + (size_t)row * numbers->width);
+        element_read(&of_indices, i, &row);
+        if (!(row >= 0 && row < (double)elements->count))
+            return gltf_fails(gltf, &indices, "element %zu names %.0f; there are %zu", i, row,
+                              elements->count);
+        element_read(&of_values, i, numbers->items + (size_t)row * numbers->width);
     }
     return true;
 }
 
-static bool layout_read(Gltf *gltf, const GltfItem *accessor, size_t width, Layout *layout)
+static bool elements_read(Gltf *gltf, const GltfItem *accessor, size_t width, Elements *elements)
 {
     static const char *const types[] = {NULL, "SCALAR", "VEC2", "VEC3"};
     const GltfItem type = gltf_member(accessor, "type");
     const char *name = json_string_value(type.json);
-    *layout = (Layout){.width = width,
-                       .is_normalized = json_is_true(json_object_get(accessor->json, "normalized"))};
+    *elements = (Elements){.width = width,
+                           .is_normalized = json_is_true(json_object_get(accessor->json, "normalized"))};
     if (!name || strcmp(name, types[width]) != 0)
         return gltf_fails(gltf, &type, "must be '%s' here", types[width]);
-    if (!gltf_integer(gltf, accessor, "componentType", GLTF_INT8, GLTF_FLOAT, &layout->type) ||
-        !gltf_integer(gltf, accessor, "byteOffset", 0, size_max, &layout->offset) ||
-        !gltf_integer(gltf, accessor, "count", 1, DRAFT_NONE - 1, &layout->count))
+    if (!gltf_integer(gltf, accessor, "componentType", GLTF_INT8, GLTF_FLOAT, &elements->type) ||
+        !gltf_integer(gltf, accessor, "byteOffset", 0, size_max, &elements->offset) ||
+        !gltf_integer(gltf, accessor, "count", 1, DRAFT_NONE - 1, &elements->count))
         return false;
-    return (layout->count > 0 && component_size(layout->type) > 0) ||
+    return (elements->count > 0 && component_size(elements->type) > 0) ||
            gltf_fails(gltf, accessor, "lacks 'count' or a 'componentType' that glTF has");
 }
 
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width, GltfNumbers *numbers)
 {
     size_t index = SIZE_MAX;
-    Layout layout;
+    Elements elements;
     *numbers = (GltfNumbers){.width = width};
     if (!gltf_index(gltf, item, key, "accessors", &index)) return false;
     if (index == SIZE_MAX) return true;
     const GltfItem accessor = gltf_entry(gltf, "accessors", index);
-    if (!layout_read(gltf, &accessor, width, &layout)) return false;
-    const char *bytes = NULL;
-    size_t stride = 0;
-    if (json_object_get(accessor.json, "bufferView") &&
-        !elements_find(gltf, &accessor, &layout, &bytes, &stride))
+    if (!elements_read(gltf, &accessor, width, &elements)) return false;
+    if (json_object_get(accessor.json, "bufferView") && !elements_find(gltf, &accessor, &elements))
         return false;
-    gltf->element_count += layout.count;
+    gltf->element_count += elements.count;
     if (gltf->element_count > gltf->byte_count + ELEMENTS_MAX)
         return gltf_fails(gltf, &accessor, "nodes name so many that all have %zu elements, more than %zu",
                           gltf->element_count, gltf->byte_count + ELEMENTS_MAX);
-    numbers->count = layout.count;
-    numbers->items = memory_allocate_zeroed(layout.count, width * sizeof *numbers->items);
-    for (size_t i = 0; i < layout.count && bytes; i++)
-        elements_read(bytes, &layout, stride, i, numbers->items + i * width);
-    return sparse_read(gltf, &accessor, &layout, numbers);
+    numbers->count = elements.count;
+    numbers->items = memory_allocate_zeroed(elements.count, width * sizeof *numbers->items);
+    for (size_t i = 0; i < elements.count && elements.bytes; i++)
+        element_read(&elements, i, numbers->items + i * width);
+    return sparse_read(gltf, &accessor, &elements, numbers);
 }
