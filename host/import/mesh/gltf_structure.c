@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-typedef enum { MEMBER_ARRAY, MEMBER_OBJECT, MEMBER_STRING, MEMBER_BOOLEAN } MemberType;
+// MEMBER_OBJECTS is an array of objects.
+typedef enum { MEMBER_ARRAY, MEMBER_OBJECT, MEMBER_STRING, MEMBER_BOOLEAN, MEMBER_OBJECTS } MemberType;
 
 // Members by their path, in which [] stands for every element. A required member of another type makes the
 // file invalid. An optional one is ignored.
@@ -16,29 +17,22 @@ static const struct {
     {"extensionsUsed", MEMBER_ARRAY, false},
     {"extensionsRequired", MEMBER_ARRAY, true},
     {"asset", MEMBER_OBJECT, true},
-    {"scenes", MEMBER_ARRAY, true},
-    {"scenes[]", MEMBER_OBJECT, true},
+    {"scenes", MEMBER_OBJECTS, true},
     {"scenes[].nodes", MEMBER_ARRAY, true},
-    {"nodes", MEMBER_ARRAY, true},
-    {"nodes[]", MEMBER_OBJECT, true},
+    {"nodes", MEMBER_OBJECTS, true},
     {"nodes[].children", MEMBER_ARRAY, true},
     {"nodes[].extensions", MEMBER_OBJECT, false},
     {"nodes[].extensions.KHR_lights_punctual", MEMBER_OBJECT, false},
-    {"meshes", MEMBER_ARRAY, true},
-    {"meshes[]", MEMBER_OBJECT, true},
+    {"meshes", MEMBER_OBJECTS, true},
     {"meshes[].primitives", MEMBER_ARRAY, true},
     {"meshes[].primitives[]", MEMBER_OBJECT, true},
     {"meshes[].primitives[].attributes", MEMBER_OBJECT, true},
-    {"accessors", MEMBER_ARRAY, true},
-    {"accessors[]", MEMBER_OBJECT, true},
+    {"accessors", MEMBER_OBJECTS, true},
     {"accessors[].normalized", MEMBER_BOOLEAN, true},
     {"accessors[].sparse", MEMBER_OBJECT, true},
-    {"bufferViews", MEMBER_ARRAY, true},
-    {"bufferViews[]", MEMBER_OBJECT, true},
-    {"buffers", MEMBER_ARRAY, true},
-    {"buffers[]", MEMBER_OBJECT, true},
-    {"materials", MEMBER_ARRAY, false},
-    {"materials[]", MEMBER_OBJECT, false},
+    {"bufferViews", MEMBER_OBJECTS, true},
+    {"buffers", MEMBER_OBJECTS, true},
+    {"materials", MEMBER_OBJECTS, false},
     {"materials[].alphaMode", MEMBER_STRING, false},
     {"materials[].emissiveTexture", MEMBER_OBJECT, false},
     {"materials[].pbrMetallicRoughness", MEMBER_OBJECT, false},
@@ -51,21 +45,16 @@ static const struct {
     {"materials[].extensions.KHR_materials_ior", MEMBER_OBJECT, false},
     {"materials[].extensions.KHR_materials_transmission", MEMBER_OBJECT, false},
     {"materials[].extensions.KHR_materials_volume", MEMBER_OBJECT, false},
-    {"textures", MEMBER_ARRAY, false},
-    {"textures[]", MEMBER_OBJECT, false},
-    {"samplers", MEMBER_ARRAY, false},
-    {"samplers[]", MEMBER_OBJECT, false},
-    {"images", MEMBER_ARRAY, false},
-    {"images[]", MEMBER_OBJECT, false},
+    {"textures", MEMBER_OBJECTS, false},
+    {"samplers", MEMBER_OBJECTS, false},
+    {"images", MEMBER_OBJECTS, false},
     {"images[].uri", MEMBER_STRING, false},
-    {"cameras", MEMBER_ARRAY, false},
-    {"cameras[]", MEMBER_OBJECT, false},
+    {"cameras", MEMBER_OBJECTS, false},
     {"cameras[].perspective", MEMBER_OBJECT, false},
     {"cameras[].orthographic", MEMBER_OBJECT, false},
     {"extensions", MEMBER_OBJECT, false},
     {"extensions.KHR_lights_punctual", MEMBER_OBJECT, false},
-    {"extensions.KHR_lights_punctual.lights", MEMBER_ARRAY, false},
-    {"extensions.KHR_lights_punctual.lights[]", MEMBER_OBJECT, false},
+    {"extensions.KHR_lights_punctual.lights", MEMBER_OBJECTS, false},
     {"extensions.KHR_lights_punctual.lights[].spot", MEMBER_OBJECT, false},
 };
 
@@ -85,6 +74,8 @@ static bool type_check(Gltf *gltf, const GltfItem *item, MemberType type)
 // Checks the members below the item to which the path leads.
 static bool path_check(Gltf *gltf, const GltfItem *item, const char *path, MemberType type)
 {
+    if (*path == '\0' && type == MEMBER_OBJECTS)
+        return type_check(gltf, item, MEMBER_ARRAY) && path_check(gltf, item, "[]", MEMBER_OBJECT);
     if (*path == '\0') return type_check(gltf, item, type);
     if (*path == '[') {
         bool is_sound = true;
