@@ -2,7 +2,6 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/import/yaml/animation.h"
 #include "host/import/yaml/yaml.h"
 #include "host/view/camera_yaml.h"
 #include <stdlib.h>

@@ -1,6 +1,7 @@
-#include "host/import/yaml/animation.h"
+// Evaluates YAML values that change from frame to frame.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/import/yaml/yaml.h"
 
 #include <stdlib.h>
 #include <string.h>

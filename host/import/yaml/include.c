@@ -1,4 +1,4 @@
-#include "host/import/yaml/include.h"
+// Reads `include` of YAML scenes.
 #include "host/base/array.h"
 #include "host/base/file.h"
 #include "host/base/hash.h"

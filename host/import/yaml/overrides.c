@@ -1,6 +1,7 @@
-#include "host/import/yaml/overrides.h"
+// Replaces values of a YAML document.
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/import/yaml/yaml.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,9 +3,6 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
-#include "host/import/yaml/animation.h"
-#include "host/import/yaml/include.h"
-#include "host/import/yaml/overrides.h"
 #include "host/scene/portable.h"
 
 #include <stdlib.h>

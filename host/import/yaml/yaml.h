@@ -1,10 +1,28 @@
-// The readers of the parts of a YAML scene, one file each.
+// The stages that change the tree of a YAML scene and the readers of its parts, one file each.
 #pragma once
 
 #include "host/import/load.h"
 #include "host/import/yaml/fields.h"
 #include "host/scene/affine.h"
 #include "host/scene/daylight.h"
+
+// Adds the files that the reader's tree includes, directly or indirectly, to the tree, to the scene and to
+// the sources after `source`, which is the report's. Their materials, definitions, lights and objects come
+// before the scene's. Reports errors and returns false if a file cannot be read.
+bool yaml_include(YamlReader *reader, Source *source);
+void yaml_included_free(YamlReader *reader);
+
+// Applies, in order, the overrides PATH=VALUE that follow the document in the report's source. Each replaces
+// the value at its PATH of the reader's tree, adds it, or removes it if VALUE is empty. Reports errors and
+// returns false if an override does not fit.
+bool yaml_override(YamlReader *reader);
+
+// Replaces each mapping `{keys: {FRAME: VALUE, …}}` of the reader's tree with its value at the options'
+// frame, a number or a list of numbers, and marks the scene as animated. Reports errors and returns false if
+// a mapping cannot be read.
+bool yaml_animate(YamlReader *reader);
+// Returns whether a node of the tree is a mapping whose `keys` are frames.
+bool yaml_has_keys(const YamlReader *reader, const YamlNode *node);
 
 // Reads the `materials` mapping, whose names read_material accepts from then on.
 void yaml_read_materials(YamlReader *reader, const YamlNode *node);
