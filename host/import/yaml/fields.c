@@ -186,14 +186,19 @@ bool field_fails(YamlReader *reader, const YamlNode *mapping, const char *name, 
     return report_error(&reader->report, field_node(reader, mapping, name)->offset, "%s", message);
 }
 
-bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
-                 const YamlNode **value)
+size_t choice_read(YamlReader *reader, const YamlNode *node, const char *type, Names names,
+                   const YamlNode **value)
 {
-    if (node->type != YAML_MAPPING || node->child_count != 2)
-        return report_error(&reader->report, node->offset, "expected %s", expected);
-    *key = yaml_first(&reader->tree, node);
-    *value = yaml_next(&reader->tree, *key);
-    return key_is_word(reader, *key);
+    if (node->type != YAML_MAPPING || node->child_count != 2) {
+        report_error(&reader->report, node->offset, "expected one %s, such as `%s: {...}`", type,
+                     name_at(names, 0));
+        return names.count;
+    }
+    const YamlNode *key = yaml_first(&reader->tree, node);
+    *value = yaml_next(&reader->tree, key);
+    const size_t index = name_find(names, yaml_text(&reader->tree, key));
+    if (index == names.count && key_is_word(reader, key)) unknown_report(reader, key, type, names);
+    return index;
 }
 
 bool read_node(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -85,11 +85,6 @@ bool field_fails(YamlReader *reader, const YamlNode *mapping, const char *name, 
 // Reports an error and returns false if a key is a list or a mapping.
 bool key_is_word(YamlReader *reader, const YamlNode *key);
 
-// Returns the only key of a mapping and its value, as in `sphere: {…}`. Reports an error and returns false
-// otherwise.
-bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
-                 const YamlNode **value);
-
 // Read a YamlNode pointer, double, Vector3, nonzero Vector3, list of the field's items or bool. Numbers must
 // be in the field's range.
 FieldReader read_node, read_number, read_vector, read_direction, read_items, read_boolean;
@@ -124,3 +119,7 @@ void choices_describe(Text *text, const char *word, Names names);
 // Reports `unknown type 'word'`, with a suggestion if a name is similar or means the same, and with the list
 // of names unless it is long. Returns false.
 bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, Names names);
+// Reads a mapping with one key, such as `sphere: {…}`, which names a `type`. Sets *value to the key's value
+// and returns the index of the name. Reports an error and returns the count of the names otherwise.
+size_t choice_read(YamlReader *reader, const YamlNode *node, const char *type, Names names,
+                   const YamlNode **value);

@@ -158,11 +158,9 @@ static const struct {
 
 static bool light_read(YamlReader *reader, const YamlNode *item)
 {
-    const YamlNode *key, *mapping;
-    if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return false;
-    const Names names = NAMES_OF(light_types);
-    const size_t row = name_find(names, yaml_text(&reader->tree, key));
-    if (row == names.count) return unknown_report(reader, key, "light", names);
+    const YamlNode *mapping;
+    const size_t row = choice_read(reader, item, "light", NAMES_OF(light_types), &mapping);
+    if (row == COUNT_OF(light_types)) return false;
     LightFields fields = {
         .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area.type = light_types[row].area},
         .intensity = 1,

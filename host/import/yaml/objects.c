@@ -226,14 +226,11 @@ static void object_read(YamlReader *reader, const YamlNode *item)
     static const char *const names[] = {SCENE_SHAPE_LIST(SHAPE_WORD) "mesh", "group", "instance"};
     static void (*const compound_readers[])(YamlReader *, const YamlNode *) = {
         yaml_read_mesh, yaml_read_group, yaml_read_instance};
-    const YamlNode *key, *mapping;
-    if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
-    const size_t type = name_find(NAMES_OF(names), yaml_text(&reader->tree, key));
-    if (type == COUNT_OF(names))
-        unknown_report(reader, key, "shape", NAMES_OF(names));
-    else if (type < SHAPE_OVAL)
+    const YamlNode *mapping;
+    const size_t type = choice_read(reader, item, "shape", NAMES_OF(names), &mapping);
+    if (type < SHAPE_OVAL)
         shape_read(reader, (ShapeType)type, mapping);
-    else
+    else if (type < COUNT_OF(names))
         compound_readers[type - SHAPE_OVAL](reader, mapping);
 }
 
