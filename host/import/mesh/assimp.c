@@ -22,30 +22,12 @@ typedef struct {
     struct aiUVTransform uv_transform;
 } ImportedMaterial;
 
-// Features that glint does not show. Each causes one warning.
-enum {
-    LOSES_SKINS,
-    LOSES_MORPHS,
-    LOSES_VERTEX_COLORS,
-    LOSES_TEXTURES,
-    LOSES_TEXTURE_PLACE,
-    LOSES_UV_TURN,
-    LOSES_CAMERAS
-};
-
 typedef struct {
     MeshDraft *draft;
     const struct aiScene *file;
     ImportedMaterial *materials;       // one for each of the file's; NULL: not used
     const struct aiMaterial *material; // of the file, which is being converted
-    unsigned losses;                   // bits
 } Importer;
-
-static void lose(Importer *importer, unsigned loss, const char *text)
-{
-    if (!(importer->losses >> loss & 1)) draft_warn(importer->draft, "%s", text);
-    importer->losses |= 1u << loss;
-}
 
 static const char *file_name(const char *path)
 {
@@ -144,7 +126,7 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
     for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++)
         if (type != aiTextureType_BASE_COLOR && type != aiTextureType_DIFFUSE &&
             aiGetMaterialTextureCount(from, (enum aiTextureType)type) > 0)
-            lose(importer, LOSES_TEXTURES, "textures of anything but the color are not used");
+            draft_warn(importer->draft, "textures of anything but the color are not used");
     if (aiGetMaterialTextureCount(from, color) == 0) return;
     struct aiString path = {0};
     enum aiTextureMapMode modes[2] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
@@ -153,7 +135,7 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
         aiReturn_SUCCESS)
         return;
     aiGetMaterialUVTransform(from, AI_MATKEY_UVTRANSFORM(color, 0), &to->uv_transform);
-    if (to->uv_transform.mRotation != 0) lose(importer, LOSES_UV_TURN, "rotations of textures are not used");
+    if (to->uv_transform.mRotation != 0) draft_warn(importer->draft, "rotations of textures are not used");
     if (to->uv_set >= AI_MAX_NUMBER_OF_TEXTURECOORDS) to->uv_set = 0;
     wraps[0] = wrap_of(modes[0]);
     wraps[1] = wrap_of(modes[1]);
@@ -272,16 +254,15 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     if (material) {
         const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
         if (material->texture > 0 && !is_textured)
-            lose(importer, LOSES_TEXTURE_PLACE, "the mesh lacks a texture's coordinates: the color is used");
+            draft_warn(importer->draft, "the mesh lacks a texture's coordinates: the color is used");
         array_push(draft->materials,
                    ((DraftMaterialRun){draft->face_start, material->scene_index[is_textured]}));
     }
     if (from->mNumBones > 0)
-        lose(importer, LOSES_SKINS, "skins are not applied: the mesh keeps its own shape, at its node");
+        draft_warn(importer->draft, "skins are not applied: the mesh keeps its own shape, at its node");
     if (from->mNumAnimMeshes > 0)
-        lose(importer, LOSES_MORPHS, "morph targets are not applied: the mesh keeps its own shape");
-    if (from->mColors[0])
-        lose(importer, LOSES_VERTEX_COLORS, "vertex colors are not used: the material's color is");
+        draft_warn(importer->draft, "morph targets are not applied: the mesh keeps its own shape");
+    if (from->mColors[0]) draft_warn(importer->draft, "vertex colors are not used: the material's color is");
     vertices_add(draft, from, affine, material);
     const bool mirrored = affine_determinant(affine) < 0;
     for (unsigned i = 0; i < from->mNumFaces; i++)
@@ -298,7 +279,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         const struct aiCamera *camera = file->mCameras[i];
         if (strcmp(camera->mName.data, node->mName.data) != 0) continue;
         if (view->has_camera) {
-            lose(importer, LOSES_CAMERAS, "only the first camera is used");
+            draft_warn(importer->draft, "only the first camera is used");
             continue;
         }
         const Vector3 eye = affine_point(affine, vector_of(&camera->mPosition)),

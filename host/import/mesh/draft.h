@@ -68,7 +68,8 @@ extern const char *const draft_part_names[DRAFT_PART_COUNT];
 // Reports an error at an offset of the file and returns false.
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Reports an error or a warning about the whole file at its name in the scene. draft_refuse returns false.
+// Reports an error or a warning about the whole file at its name in the scene, each text once. draft_refuse
+// returns false.
 bool draft_refuse(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

@@ -11,29 +11,6 @@
 // A JSON text's numbers take about 20 times its bytes in memory.
 enum { JSON_BYTES_MAX = 1 << 28 };
 
-static const char *const loss_texts[GLTF_LOSS_COUNT] = {
-    [GLTF_SKIN] = "skins are not applied: the mesh keeps its own shape, at its node",
-    [GLTF_MORPH] = "morph targets are not applied: the mesh keeps its own shape",
-    [GLTF_VERTEX_COLOR] = "vertex colors are not used: the material's color is",
-    [GLTF_POINTS] = "points and lines are not shown",
-    [GLTF_NO_POSITIONS] = "has no 'POSITION' and is not shown",
-    [GLTF_SCENES] = "only this scene is shown",
-    [GLTF_ANIMATION] = "animations are not played: nodes stand as the file has them",
-    [GLTF_VIEW] = "cameras and lights of a mesh are not used: those of the scene are",
-    [GLTF_CAMERAS] = "only the first camera is used",
-    [GLTF_EMISSION] =
-        "only glint render FILE shows emission by a texture and unlit textures: lit by the lights instead",
-    [GLTF_EMISSIVE_TEXTURE] = "emission next to a different texture is not shown",
-    [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
-    [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",
-    [GLTF_METAL_COLOR] = "reflections of metals do not have the colors of a texture",
-    [GLTF_NORMAL_TEXTURE_PLACE] = "the normal texture has other coordinates than the color: it is not used",
-    [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
-    [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: it is not used",
-    [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
-    [GLTF_GLASS_COLOR] = "transmitted light does not have the colors of a texture",
-};
-
 static const char *const extensions_read[] = {
     "KHR_lights_punctual",   "KHR_materials_emissive_strength", "KHR_materials_ior",
     "KHR_materials_unlit",   "KHR_materials_transmission",      "KHR_materials_volume",
@@ -60,10 +37,9 @@ void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     free(text);
 }
 
-void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item)
+void gltf_lose(Gltf *gltf, const GltfItem *item, const char *text)
 {
-    if (!(gltf->losses >> loss & 1)) gltf_warn(gltf, item, "%s", loss_texts[loss]);
-    gltf->losses |= 1u << loss;
+    if (!report_repeats(&gltf->draft->report, NULL, 0, 0, text)) gltf_warn(gltf, item, "%s", text);
 }
 
 GltfItem gltf_member(const GltfItem *item, const char *key)
@@ -286,7 +262,8 @@ bool gltf_read(MeshDraft *draft)
     if (read) {
         gltf_open(&gltf);
         const GltfItem animations = gltf_root_member(&gltf, "animations");
-        if (animations.json) gltf_lose(&gltf, GLTF_ANIMATION, &animations);
+        if (animations.json)
+            gltf_lose(&gltf, &animations, "animations are not played: nodes stand as the file has them");
         read = asset_check(&gltf) && extensions_check(&gltf) && gltf_structure_check(&gltf) &&
                gltf_scene_read(&gltf);
     }

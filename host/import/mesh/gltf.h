@@ -40,30 +40,6 @@ typedef struct {
     uint32_t scene_index[2]; // without and with the texture, DRAFT_NONE before it is added
 } GltfMaterial;
 
-// Features that glint does not show. Each causes one warning, which names the first place in the file.
-typedef enum {
-    GLTF_SKIN,
-    GLTF_MORPH,
-    GLTF_VERTEX_COLOR,
-    GLTF_POINTS,
-    GLTF_NO_POSITIONS,
-    GLTF_SCENES,
-    GLTF_ANIMATION,
-    GLTF_VIEW,
-    GLTF_CAMERAS,
-    GLTF_EMISSION,
-    GLTF_EMISSIVE_TEXTURE,
-    GLTF_UNLIT_TINT,
-    GLTF_METAL_TEXTURE,
-    GLTF_METAL_COLOR,
-    GLTF_NORMAL_TEXTURE_PLACE,
-    GLTF_OCCLUSION_TEXTURE,
-    GLTF_TEXTURE_PLACE,
-    GLTF_NEAREST,
-    GLTF_GLASS_COLOR,
-    GLTF_LOSS_COUNT
-} GltfLoss;
-
 typedef struct {
     MeshDraft *draft;
     json_t *root;
@@ -74,7 +50,6 @@ typedef struct {
     GltfMaterial *materials;          // one for each of the file's, then the default
     uint32_t *images; // the textures of each image as colors and as normals, DRAFT_NONE before they are read
     bool *is_visited; // by node
-    unsigned losses;  // a bit for each GltfLoss that was warned of
     bool is_optional; // whether errors in what is being read are warnings
 } Gltf;
 
@@ -83,8 +58,8 @@ bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Warns about a loss the first time that it occurs.
-void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item);
+// Warns about a feature that glint does not show. Only the first place with the same text is named.
+void gltf_lose(Gltf *gltf, const GltfItem *item, const char *text);
 
 // Returns a member of an object or an element of an array.
 GltfItem gltf_member(const GltfItem *item, const char *key);

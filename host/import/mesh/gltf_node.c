@@ -148,11 +148,14 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     const GltfItem attributes = gltf_member(primitive, "attributes"),
                    colors = gltf_member(&attributes, "COLOR_0"), targets = gltf_member(primitive, "targets");
     if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) {
-        gltf_lose(gltf, mode < MODE_TRIANGLES ? GLTF_POINTS : GLTF_NO_POSITIONS, primitive);
+        gltf_lose(gltf, primitive,
+                  mode < MODE_TRIANGLES ? "points and lines are not shown"
+                                        : "has no 'POSITION' and is not shown");
         return true;
     }
-    if (colors.json) gltf_lose(gltf, GLTF_VERTEX_COLOR, &colors);
-    if (targets.json) gltf_lose(gltf, GLTF_MORPH, &targets);
+    if (colors.json) gltf_lose(gltf, &colors, "vertex colors are not used: the material's color is");
+    if (targets.json)
+        gltf_lose(gltf, &targets, "morph targets are not applied: the mesh keeps its own shape");
     GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
     Vertices vertices;
     const bool read = vertices_read(gltf, primitive, material, &vertices);
@@ -160,7 +163,8 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
         const bool has_texture = material->texture.number > 0 || material->normals.number > 0,
                    has_uvs = vertices.uvs.count > 0;
         const uint32_t index = gltf_material_index(gltf, material, has_texture && has_uvs);
-        if (has_texture && !has_uvs) gltf_lose(gltf, GLTF_TEXTURE_PLACE, primitive);
+        if (has_texture && !has_uvs)
+            gltf_lose(gltf, primitive, "the mesh lacks the texture's coordinates: it is not used");
         array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
     }
     if (read) {
@@ -180,7 +184,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
                    flat = gltf_member(camera, "orthographic");
     double angle = 0, aspect = 0, half_width = 0, half_height = 0;
     if (view->has_camera) {
-        gltf_lose(gltf, GLTF_CAMERAS, camera);
+        gltf_lose(gltf, camera, "only the first camera is used");
         return;
     }
     gltf->is_optional = true;
@@ -256,7 +260,7 @@ static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
         gltf_fails(gltf, &extension, "the file has no lights");
     gltf->is_optional = false;
     if ((camera != SIZE_MAX || light != SIZE_MAX) && !gltf->draft->import->view) {
-        gltf_lose(gltf, GLTF_VIEW, node);
+        gltf_lose(gltf, node, "cameras and lights of a mesh are not used: those of the scene are");
         return;
     }
     const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
@@ -275,7 +279,7 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     Affine local, affine;
     if (!transform_read(gltf, &node, &local)) return false;
     affine = affine_multiply(parent, &local);
-    if (skin.json) gltf_lose(gltf, GLTF_SKIN, &skin);
+    if (skin.json) gltf_lose(gltf, &skin, "skins are not applied: the mesh keeps its own shape, at its node");
     view_add(gltf, &node, &affine);
     size_t mesh_index = SIZE_MAX;
     if (!gltf_index(gltf, &node, "mesh", "meshes", &mesh_index)) return false;
@@ -323,7 +327,7 @@ bool gltf_scene_read(Gltf *gltf)
         read = roots_add(gltf, &affine_identity);
     } else if (gltf_index(gltf, &root, "scene", "scenes", &index)) {
         const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_member(&scene, "nodes");
-        if (gltf_count(gltf, "scenes") > 1) gltf_lose(gltf, GLTF_SCENES, &scene);
+        if (gltf_count(gltf, "scenes") > 1) gltf_lose(gltf, &scene, "only this scene is shown");
         for (size_t i = 0; i < json_array_size(nodes.json) && read; i++) {
             size_t node;
             read = gltf_element_index(gltf, &nodes, i, "nodes", &node) &&
