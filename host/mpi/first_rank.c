@@ -13,14 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static Rank rank_of_message(const Rank *received)
-{
-    Rank rank = *received;
-    rank.device[sizeof rank.device - 1] = rank.driver[sizeof rank.driver - 1] = '\0';
-    rank.host[sizeof rank.host - 1] = rank.failure[sizeof rank.failure - 1] = '\0';
-    return rank;
-}
-
 static void ranks_start(bool can_start)
 {
     Order order = {.type = can_start ? ORDER_START : ORDER_CANCEL};
@@ -31,15 +23,19 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
                         const char *device_selector, MessageList *messages)
 {
     Job job = {.type = JOB_IMAGE,
-               .settings = job_settings_of(settings),
+               .settings = *settings,
                .aovs = aovs,
                .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
+    // the others show no progress, stop when they receive TAG_END, and neither hash nor keep the scene
+    job.settings.stop = NULL;
+    job.settings.stop_context = NULL;
+    job.settings.stage = NULL;
+    job.settings.hashes_scene = job.settings.moves = false;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
     Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);
     MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
-    for (size_t i = 0; i < ranks->remote.count; i++)
-        ranks->items[i] = rank_of_message(&all[i + 1]);
+    memcpy(ranks->items, all + 1, ranks->remote.count * sizeof *all);
     free(all);
     bool all_fit = true;
     for (size_t i = 0; i < ranks->remote.count; i++) {

@@ -3,25 +3,6 @@
 #include "host/base/memory.h"
 #include <time.h>
 
-// Compiles only for a value of one of these types, none of which is a pointer.
-#define IS_PLAIN(value) _Generic((value), bool : 1, uint32_t : 1, uint64_t : 1, double : 1)
-
-#define JOB_SETTING_CHECK(Type, name)                                                                        \
-    _Static_assert(IS_PLAIN(((JobSettings *)0)->name) && sizeof(Type) == sizeof((RenderSettings *)0)->name,  \
-                   #name " of a job is not that of RenderSettings");
-JOB_SETTINGS_LIST(JOB_SETTING_CHECK)
-
-#define JOB_SETTING_COPY(Type, name) .name = settings->name,
-JobSettings job_settings_of(const RenderSettings *settings)
-{
-    return (JobSettings){JOB_SETTINGS_LIST(JOB_SETTING_COPY)};
-}
-
-RenderSettings settings_of_job(const JobSettings *settings)
-{
-    return (RenderSettings){JOB_SETTINGS_LIST(JOB_SETTING_COPY)};
-}
-
 void rest(void)
 {
     nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
@@ -85,50 +66,17 @@ void end_await(bool *has_ended)
     *has_ended = true;
 }
 
-// The members of a CompiledScene that are read by renderers that do not move. The items of the arrays follow.
-typedef struct {
-    uint64_t counts[FLAT_COUNT];
-    FlatLayout layouts[FLAT_COUNT];
-    FeatureSet features;
-    double unit;
-    uint32_t pending_children_max;
-} CompiledHeader;
-
-static CompiledHeader header_of(const CompiledScene *compiled)
-{
-    CompiledHeader header = {.features = compiled->features,
-                             .unit = compiled->unit,
-                             .pending_children_max = compiled->pending_children_max};
-    for (size_t type = 0; type < FLAT_COUNT; type++) {
-        header.counts[type] = compiled->arrays[type].count;
-        header.layouts[type] = compiled->arrays[type].layout;
-    }
-    return header;
-}
-
-// Returns a scene whose items are allocated but not yet received.
-static CompiledScene compiled_of(const CompiledHeader *header)
-{
-    CompiledScene compiled = {.features = header->features,
-                              .unit = header->unit,
-                              .pending_children_max = header->pending_children_max};
-    for (size_t type = 0; type < FLAT_COUNT; type++) {
-        const size_t count = (size_t)header->counts[type];
-        const FlatLayout layout = header->layouts[type];
-        compiled.arrays[type] = (FlatArray){memory_allocate_large(count, layout.size), count, layout};
-        compiled.changed[type] = true;
-    }
-    return compiled;
-}
-
+// Broadcasts the struct and the items of its arrays. Renderers that do not move the scene read nothing else.
 static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm ranks)
 {
-    CompiledHeader header = {0};
-    if (is_sender) header = header_of(compiled);
-    broadcast(&header, sizeof header, ranks);
-    if (!is_sender) *compiled = compiled_of(&header);
+    broadcast(compiled, sizeof *compiled, ranks);
+    if (!is_sender) {
+        compiled->textures = NULL;
+        compiled->instances = NULL;
+    }
     for (size_t type = 0; type < FLAT_COUNT; type++) {
-        const FlatArray *array = &compiled->arrays[type];
+        FlatArray *array = &compiled->arrays[type];
+        if (!is_sender) array->items = memory_allocate_large(array->count, array->layout.size);
         broadcast(array->items, array->count * array->layout.size, ranks);
     }
 }

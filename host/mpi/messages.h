@@ -1,6 +1,6 @@
 // The protocol between the ranks of a job. All ranks are processes of one program and one architecture, so
-// messages are structs without pointers, which would mean nothing in another process. If a process dies,
-// mpirun ends the job.
+// messages are structs. Pointers in them are NULL or replaced by the receiver. If a process dies, mpirun ends
+// the job.
 //
 // The first rank broadcasts Jobs, the last of which is JOB_END.
 //
@@ -43,43 +43,9 @@ typedef struct {
     uint32_t rows_max, step;
 } Request;
 
-// MEMBER(Type, name): the settings that the other ranks need. These ranks do not compile the scene, show no
-// progress and stop when the first rank tells them to.
-#define JOB_SETTINGS_LIST(MEMBER)                                                                            \
-    MEMBER(uint32_t, width)                                                                                  \
-    MEMBER(uint32_t, height)                                                                                 \
-    MEMBER(uint32_t, region_x)                                                                               \
-    MEMBER(uint32_t, region_y)                                                                               \
-    MEMBER(uint32_t, region_width)                                                                           \
-    MEMBER(uint32_t, region_height)                                                                          \
-    MEMBER(uint32_t, cell)                                                                                   \
-    MEMBER(uint32_t, sample_count)                                                                           \
-    MEMBER(uint32_t, first_sample)                                                                           \
-    MEMBER(uint32_t, end_sample)                                                                             \
-    MEMBER(uint32_t, bounce_count)                                                                           \
-    MEMBER(double, min_contribution)                                                                         \
-    MEMBER(Precision, precision)                                                                             \
-    MEMBER(uint32_t, lanes)                                                                                  \
-    MEMBER(bool, counting)                                                                                   \
-    MEMBER(bool, no_cache)                                                                                   \
-    MEMBER(double, band_seconds)                                                                             \
-    MEMBER(FeatureSet, extra_features)                                                                       \
-    MEMBER(uint32_t, perturb_seed)                                                                           \
-    MEMBER(uint32_t, perturb_scale)                                                                          \
-    MEMBER(uint32_t, band_rows)
-
-#define JOB_SETTING(Type, name) Type name;
-typedef struct {
-    JOB_SETTINGS_LIST(JOB_SETTING)
-} JobSettings;
-
-// Convert the settings. What a job does not have is 0.
-JobSettings job_settings_of(const RenderSettings *settings);
-RenderSettings settings_of_job(const JobSettings *settings);
-
 typedef struct {
     enum { JOB_END, JOB_FRAMES, JOB_IMAGE } type;
-    JobSettings settings; // of an image, like the members below
+    RenderSettings settings; // of an image, like the members below; all pointers are NULL
     unsigned aovs;
     size_t selector_size; // of the device selector with its NUL, which follows, or 0 for none
 } Job;

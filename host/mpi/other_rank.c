@@ -72,8 +72,7 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         snprintf(self->failure, sizeof self->failure, "%s", worker->messages.items[0].text);
         return;
     }
-    const RenderSettings settings = settings_of_job(&job->settings);
-    worker->renderer = renderer_open_empty(compute, &settings, worker->renderer, &worker->messages);
+    worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
     rank_set_device(self, compute->device);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
         self->lanes[pass] = renderer_lanes(worker->renderer, pass);

@@ -12,6 +12,7 @@ enum { SAMPLES_MAX = 1 << 20, LANES_MAX = 16 };
 // that an injected error stays below one binade.
 enum { PERTURB_SCALE_MAX = 1000 };
 
+// glint-mpi sends these settings to other processes, all but the three pointers.
 typedef struct {
     // The image.
     uint32_t width, height;                                   // of the whole image
