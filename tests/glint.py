@@ -266,15 +266,13 @@ def png_read(path):
 
 
 def checkpoint_rows(path):
-    """Returns the number of rows of all whole records, or 0 if there is no such file."""
+    """Returns the number of rows of all whole records, which have only colors, or 0 if there is no such file."""
     data = Path(path).read_bytes() if Path(path).exists() else b""
-    head, record = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQQQ16s")
-    if len(data) < head.size:
-        return 0
-    at, rows = head.size + head.unpack_from(data)[2], 0
+    record, rows = struct.Struct("<6IQQQ16s"), 0
+    at = data.find(b"\0", struct.calcsize("<16sQ16s")) + 1 or len(data)
     while at + record.size <= len(data):
-        _, _, row_count, *_, size, _ = record.unpack_from(data, at)
-        at += record.size + size
+        width, _, row_count, _, real_size, *_ = record.unpack_from(data, at)
+        at += record.size + 3 * width * row_count * real_size
         rows += row_count if at <= len(data) else 0
     return rows
 
