@@ -6,10 +6,10 @@
 // These invariants hold whenever the mutex is free:
 //
 //  1. The first `delivered_rows` rows have reached the sink. Until `has_ended`, each of the others is in
-//     `free_rows`, in the `rows` of one worker, in `waiting` or in the band that the sink has.
+//     `is_free`, in the `rows` of one worker, in `waiting` or in the band that the sink has.
 //  2. `is_delivering` is set while the sink has a band, which starts at `delivered_rows`. So bands reach the
 //     sink one at a time and in order. The mutex is free meanwhile.
-//  3. `free_rows` are sorted, disjoint and not empty. With a checkpoint, `waiting` bands have no layers.
+//  3. `free_count` is the number of rows in `is_free`. With a checkpoint, `waiting` bands have no layers.
 //  4. A worker that acquires rows has none and is not dropped. A dropped worker has none.
 //  5. `has_ended` and `is_dropped` are never cleared.
 //  6. A change that may give a waiting worker rows, or end its wait, broadcasts `changed` before the function
@@ -45,9 +45,10 @@ struct Scheduler {
     uint32_t delivered_rows; // to the sink
     bool is_delivering, has_ended;
     WorkerState *workers;
-    ARRAY_OF(BandRows) free_rows; // neither taken nor rendered, from the top
-    ARRAY_OF(Film) waiting;       // copies, which have no layers if the checkpoint has them
-    size_t row_bytes;             // memory per row of a waiting band; 0 if none or unknown
+    bool *is_free;          // by row: neither taken nor rendered
+    uint32_t free_count;    // the number of these rows
+    ARRAY_OF(Film) waiting; // copies, which have no layers if the checkpoint has them
+    size_t row_bytes;       // memory per row of a waiting band; 0 if none or unknown
 };
 
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
@@ -61,7 +62,7 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
     for (size_t i = 0; i < scheduler->waiting.count; i++)
         film_free(&scheduler->waiting.items[i]);
     free(scheduler->waiting.items);
-    free(scheduler->free_rows.items);
+    free(scheduler->is_free);
     free(scheduler->workers);
     pthread_cond_destroy(&scheduler->changed);
     pthread_mutex_destroy(&scheduler->mutex);
@@ -86,12 +87,21 @@ static double share_of(const Scheduler *scheduler, size_t worker)
     return scheduler->workers[worker].rows_per_second / (mean * (double)active);
 }
 
-static uint32_t rows_free(const Scheduler *scheduler)
+// Adds rows to the free ones, or removes them, all of which are there.
+static void rows_set_free(Scheduler *scheduler, BandRows rows, bool is_free)
 {
-    uint32_t rows = 0;
-    for (size_t i = 0; i < scheduler->free_rows.count; i++)
-        rows += scheduler->free_rows.items[i].row_count;
-    return rows;
+    memset(scheduler->is_free + rows.first_row, is_free, rows.row_count);
+    scheduler->free_count += is_free ? rows.row_count : -rows.row_count;
+}
+
+// Returns the uppermost free rows, up to the first row that is not free.
+static BandRows rows_first(const Scheduler *scheduler)
+{
+    const bool *first = memchr(scheduler->is_free, true, scheduler->settings.row_count);
+    const uint32_t first_row = (uint32_t)(first - scheduler->is_free),
+                   left = scheduler->settings.row_count - first_row;
+    const bool *end = memchr(first, false, left);
+    return (BandRows){first_row, end ? (uint32_t)(end - first) : left};
 }
 
 // Returns whether all other workers are dropped or never existed.
@@ -119,7 +129,7 @@ static double others_seconds(const Scheduler *scheduler, size_t worker)
     for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
         const WorkerState *other = &scheduler->workers[i];
         if (i == worker || other->is_dropped || other->rows_per_second <= 0) continue;
-        const uint32_t rows = other->rows.row_count + rows_free(scheduler);
+        const uint32_t rows = other->rows.row_count + scheduler->free_count;
         least = fmin(least, rows / other->rows_per_second);
     }
     return least;
@@ -128,53 +138,25 @@ static double others_seconds(const Scheduler *scheduler, size_t worker)
 // Returns the most rows that a worker which has others next to it gets. The fastest worker always gets some.
 static uint32_t rows_fair(const Scheduler *scheduler, size_t worker, uint32_t step)
 {
-    const double pace = scheduler->workers[worker].rows_per_second, left = rows_free(scheduler);
+    const double pace = scheduler->workers[worker].rows_per_second, left = scheduler->free_count;
     if (pace <= 0) return step;
     if (fmin(step, left) / pace > others_seconds(scheduler, worker)) return 0;
     return (uint32_t)fmax(1, 0.5 * share_of(scheduler, worker) * left / step) * step;
 }
 
-// Returns the rows for the worker, beginning at the first free row. Returns none while they are too far down,
-// or if another worker would end sooner.
+// Returns the rows for the worker, beginning at the first free row, of which there must be one. Returns none
+// while they are too far down, or if another worker would end sooner.
 static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
 {
-    const BandRows *first = &scheduler->free_rows.items[0];
+    const BandRows first = rows_first(scheduler);
     uint32_t rows = rows_max, limit = row_limit(scheduler);
     if (!is_alone(scheduler, worker)) {
         const uint32_t fair = rows_fair(scheduler, worker, step);
         if (rows > fair) rows = fair;
     }
-    if (rows > first->row_count) rows = first->row_count;
-    if (first->first_row > scheduler->delivered_rows && first->first_row + rows > limit) rows = 0;
-    return (BandRows){first->first_row, rows};
-}
-
-// Inserts rows into the free rows.
-static void rows_insert(Scheduler *scheduler, BandRows rows)
-{
-    array_push(scheduler->free_rows, rows);
-    size_t at = scheduler->free_rows.count - 1;
-    for (; at > 0 && scheduler->free_rows.items[at - 1].first_row > rows.first_row; at--)
-        scheduler->free_rows.items[at] = scheduler->free_rows.items[at - 1];
-    scheduler->free_rows.items[at] = rows;
-}
-
-// Removes the rows from the free rows, if they are among them.
-static void rows_remove(Scheduler *scheduler, BandRows rows)
-{
-    for (size_t i = 0; i < scheduler->free_rows.count; i++) {
-        BandRows *free_rows = &scheduler->free_rows.items[i];
-        const uint32_t end = free_rows->first_row + free_rows->row_count;
-        if (rows.first_row < free_rows->first_row || rows.first_row + rows.row_count > end) continue;
-        const BandRows below = {rows.first_row + rows.row_count, end - rows.first_row - rows.row_count};
-        free_rows->row_count = rows.first_row - free_rows->first_row;
-        if (free_rows->row_count == 0) {
-            scheduler->free_rows.count--;
-            memmove(free_rows, free_rows + 1, (scheduler->free_rows.count - i) * sizeof *free_rows);
-        }
-        if (below.row_count > 0) rows_insert(scheduler, below);
-        return;
-    }
+    if (rows > first.row_count) rows = first.row_count;
+    if (first.first_row > scheduler->delivered_rows && first.first_row + rows > limit) rows = 0;
+    return (BandRows){first.first_row, rows};
 }
 
 static bool rows_are_out(const Scheduler *scheduler)
@@ -188,12 +170,12 @@ static bool rows_are_out(const Scheduler *scheduler)
 static BandRows rows_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step,
                              bool *waits)
 {
-    const bool is_free = scheduler->free_rows.count > 0;
+    const bool is_free = scheduler->free_count > 0;
     BandRows rows = {0};
     if (is_free && !scheduler->has_ended) rows = rows_choose(scheduler, worker, rows_max, step);
     *waits = rows.row_count == 0 && !scheduler->has_ended && (is_free || rows_are_out(scheduler));
     if (rows.row_count == 0) return rows;
-    rows_remove(scheduler, rows);
+    rows_set_free(scheduler, rows, false);
     scheduler->workers[worker].rows = rows;
     scheduler->workers[worker].taken_seconds = clock_seconds();
     return rows;
@@ -265,7 +247,7 @@ static void checkpoint_resume(Scheduler *scheduler)
     size_t count;
     const BandRows *bands = checkpoint_bands(scheduler->settings.checkpoint, &count);
     for (size_t i = 0; i < count; i++) {
-        rows_remove(scheduler, bands[i]);
+        rows_set_free(scheduler, bands[i], false);
         array_push(scheduler->waiting,
                    ((Film){.first_row = bands[i].first_row, .height = bands[i].row_count}));
     }
@@ -285,7 +267,8 @@ Scheduler *scheduler_open(const SchedulerSettings *settings)
     scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
     if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
         fault("out of memory: mutex");
-    array_push(scheduler->free_rows, ((BandRows){0, settings->row_count}));
+    scheduler->is_free = memory_allocate(settings->row_count, sizeof *scheduler->is_free);
+    rows_set_free(scheduler, (BandRows){0, settings->row_count}, true);
     pthread_mutex_lock(&scheduler->mutex);
     if (settings->checkpoint) checkpoint_resume(scheduler);
     pthread_mutex_unlock(&scheduler->mutex);
@@ -343,7 +326,7 @@ void scheduler_drop(Scheduler *scheduler, size_t worker)
     pthread_mutex_lock(&scheduler->mutex);
     WorkerState *dropped = &scheduler->workers[worker];
     dropped->is_dropped = true;
-    if (dropped->rows.row_count > 0) rows_insert(scheduler, dropped->rows);
+    rows_set_free(scheduler, dropped->rows, true);
     dropped->rows = (BandRows){0};
     const bool others_continue = !is_alone(scheduler, worker);
     while (scheduler->is_delivering)
