@@ -87,7 +87,7 @@ typedef struct {
 
 typedef struct {
     cl_program program;
-    cl_kernel kernel;    // the request's, or NULL if there is none or the caller owns it
+    cl_kernel kernel;    // the request's, or NULL if there is none
     uint64_t text_hash;  // of the composed text, prelude included
     bool is_out_of_line; // built with the out-of-line prelude
     double build_seconds;

@@ -18,11 +18,8 @@ static void variant_close(KernelVariant *variant, Compute *compute)
 {
     for (size_t type = 0; type < KERNEL_COUNT; type++) {
         KernelSlot *slot = &variant->slots[type];
-        if (slot->kernel) {
-            // since its launch, its program's binary holds finished machine code
-            program_store(compute, &slot->request, &slot->program);
-            clReleaseKernel(slot->kernel);
-        }
+        // since its launch, a program's binary holds finished machine code
+        if (slot->program.kernel) program_store(compute, &slot->request, &slot->program);
         program_close(&slot->program);
     }
     text_free(&variant->prelude);
@@ -61,12 +58,12 @@ void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, co
         text_free(&out_of_line_prelude);
     } else {
         variant_close(variant, kernels->scene->compute);
-        *variant = (KernelVariant){prelude, out_of_line_prelude, options, {{.kernel = NULL}}};
+        *variant = (KernelVariant){prelude, out_of_line_prelude, options, {{.program = {0}}}};
         memset(kernels->paces, 0, sizeof kernels->paces);
     }
     for (size_t type = 0; type < KERNEL_COUNT; type++)
-        if (variant->slots[type].kernel)
-            device_scene_set_arguments(kernels->scene, variant->slots[type].kernel);
+        if (variant->slots[type].program.kernel)
+            device_scene_set_arguments(kernels->scene, variant->slots[type].program.kernel);
 }
 
 char *kernels_text(const Kernels *kernels)
@@ -97,19 +94,17 @@ static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
     report->build_seconds += slot->program.build_seconds;
     report->build_from_cache &= slot->program.from_cache;
     report->is_out_of_line |= slot->program.is_out_of_line;
-    slot->kernel = slot->program.kernel;
-    slot->program.kernel = NULL;
-    device_scene_set_arguments(kernels->scene, slot->kernel);
+    device_scene_set_arguments(kernels->scene, slot->program.kernel);
 }
 
 cl_kernel kernels_get(Kernels *kernels, KernelType type)
 {
     KernelSlot *slot = &kernels->variant.slots[type];
-    if (!slot->kernel) slot_build(kernels, slot, type);
+    if (!slot->program.kernel) slot_build(kernels, slot, type);
     // AOV kernels do not change the hash that identifies an image
     const bool is_of_image = type != KERNEL_AOV && type != KERNEL_PATH && type != KERNEL_COVERAGE;
     if (is_of_image && !kernels->is_rerender) kernels->report->kernel_hash = slot->program.text_hash;
-    return slot->kernel;
+    return slot->program.kernel;
 }
 
 double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, const size_t *first,
@@ -119,9 +114,9 @@ double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, con
     KernelSlot *slot = &kernels->variant.slots[type];
     const char *name = kernel_sources[type].name;
     fault_record_kernel(name);
-    capture_launch(compute, &(Launch){slot->kernel, &slot->request, slot->program.is_out_of_line, dimensions,
-                                      first, items, group});
-    LaunchTime time = kernel_launch(compute, slot->kernel, dimensions, first, items, group);
+    capture_launch(compute, &(Launch){slot->program.kernel, &slot->request, slot->program.is_out_of_line,
+                                      dimensions, first, items, group});
+    LaunchTime time = kernel_launch(compute, slot->program.kernel, dimensions, first, items, group);
     fault_record_kernel(NULL);
     const bool is_fixed = compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)

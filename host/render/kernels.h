@@ -19,8 +19,7 @@ typedef enum {
 
 typedef struct {
     ProgramRequest request;
-    Program program;
-    cl_kernel kernel; // NULL until it is first requested
+    Program program; // without a kernel until it is first requested
 } KernelSlot;
 
 // Kernels whose text follows the same definitions.
