@@ -184,11 +184,6 @@ void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size)
     return compute_check_object(compute, mapped, status, "clEnqueueMapBuffer") ? mapped : NULL;
 }
 
-void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped)
-{
-    compute_try(compute, clEnqueueUnmapMemObject(compute->queue, buffer, mapped, 0, NULL, NULL));
-}
-
 static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
 {
     (void)buffer;

@@ -130,9 +130,8 @@ bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
 // Maps at least one byte of a buffer from `begin` on for writing `size` bytes of new contents. Returns NULL
-// if the device failed. buffer_write_mapped transfers the contents.
+// if the device failed. compute_unmap transfers the contents.
 void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size);
-void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
 // Creates a read-only buffer of bytes from memory_allocate_large and takes ownership of them, even on
 // failure. A CPU may read large contents in place; other devices use a copy. Returns NULL on failure.

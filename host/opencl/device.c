@@ -245,14 +245,6 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     array_push(*list, device);
 }
 
-// Sets a variable that PoCL reads when it compiles a kernel for its first launch. A kernel specialized for
-// one work-group size is not faster here than the generic one, which its binaries need in any case, so this
-// avoids compiling both.
-static void pocl_compile_once(void)
-{
-    setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
-}
-
 // Returns the platform's devices, which the caller frees.
 static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform, cl_uint *count)
 {
@@ -269,7 +261,9 @@ static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform,
 
 void device_list_open(DeviceList *list, WarningReceiver *warnings)
 {
-    pocl_compile_once();
+    // PoCL reads this when it compiles a kernel for its first launch. A kernel specialized for one work-group
+    // size is not faster here than the generic one, which its binaries need in any case.
+    setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
     *list = (DeviceList){0};
     cl_uint platform_count = 0;
     fault_record_call("clGetPlatformIDs");

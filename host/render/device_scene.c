@@ -88,7 +88,7 @@ static void array_upload(DeviceScene *scene, size_t type, const FlatArray *array
     if (!bytes) return;
     flat_array_write(array, scene->is_double, bytes);
     if (scene->hashes && !is_ordered_by_bvh(type)) scene->hash = hash_bytes(scene->hash, bytes, size);
-    if (!staged) buffer_write_mapped(scene->compute, scene->buffers[buffer], bytes);
+    if (!staged) compute_unmap(scene->compute, scene->buffers[buffer], bytes);
 }
 
 static void staged_upload(DeviceScene *scene)
