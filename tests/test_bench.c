@@ -100,7 +100,8 @@ TEST(stalled_launches)
 TEST(event_without_times)
 {
     OwnedBenchTimes times = times_make(30, 1);
-    LaunchTime zeros = {.host_seconds = 0.030, .host_start_seconds = 9};
+    LaunchTime zeros = launch_time_classify(0, 0, 0.030, 0);
+    zeros.host_start_seconds = 9;
     bench_add_launch(&times, &zeros);
     bench_end_run(&times, 0.045, 0.06);
     assert_string_equal(bench_clock_fault(&times), "the runtime reports no times for events");

@@ -44,8 +44,8 @@ static void launches_print(FILE *stream, const RenderReport *report)
     for (size_t i = 0; i < report->launches.count; i++) {
         const LaunchTime *time = &report->launches.items[i].time;
         fprintf(stream, "    %-9s %9.3f ms, by the host %9.3f ms%s%s\n", report->launches.items[i].name,
-                1e3 * time->event_seconds, 1e3 * time->host_seconds, time->trusted ? "" : "; ",
-                time->trusted ? "" : launch_clock_fault(time));
+                1e3 * time->event_seconds, 1e3 * time->host_seconds, time->fault ? "; " : "",
+                time->fault ? time->fault : "");
     }
 }
 
@@ -199,7 +199,7 @@ static void launches_json(Json *json, const RenderReport *report)
         const LaunchTime *time = &report->launches.items[i].time;
         json_begin_object(json, NULL);
         json_text(json, "name", report->launches.items[i].name);
-        figure_json(json, "event_ms", 1e3, (Figure){time->event_seconds, launch_clock_fault(time)});
+        figure_json(json, "event_ms", 1e3, (Figure){time->event_seconds, time->fault});
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         command_json(json, report, time);
         json_end(json);

@@ -53,10 +53,9 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_MAX; i++) {
         const LaunchTime *time = &launches[i].time;
-        const char *clock_fault = launch_clock_fault(time);
-        if (clock_fault)
+        if (time->fault)
             fprintf(stderr, "    %-9s %9.3f ms  by the host's clock: %s\n", launches[i].name,
-                    1e3 * time->host_seconds, clock_fault);
+                    1e3 * time->host_seconds, time->fault);
         else
             fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms\n", launches[i].name, 1e3 * time->event_seconds,
                     1e3 * time->host_seconds);
@@ -165,7 +164,7 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
             json_none(json, "event_ms");
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         command_json(json, report, time);
-        if (!time->trusted) json_text(json, "doubt", launch_clock_fault(time));
+        if (time->fault) json_text(json, "doubt", time->fault);
         json_end(json);
     }
     json_end(json);

@@ -35,8 +35,8 @@ static bool clock_drifts(BenchTimes *times, const LaunchTime *launch)
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch)
 {
     if (!times->clock_fault) {
-        if (!launch->trusted)
-            times->clock_fault = launch_clock_fault(launch);
+        if (launch->fault)
+            times->clock_fault = launch->fault;
         else if (clock_drifts(times, launch))
             times->clock_fault = "the device's clock drifts from the host's by more than 1%";
     }

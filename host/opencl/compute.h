@@ -144,10 +144,9 @@ typedef struct {
     double event_seconds;      // end - start; 0 where the runtime reports zeros
     double host_seconds;       // from enqueue until the host sees it complete
     double host_start_seconds; // clock_seconds() before the enqueue
-    // False for zeros, a mere counter, an end before the start, or an event longer than host_seconds.
     bool trusted;
-    const char *fault;  // of the device's timer by its passport, which makes the time untrusted, or NULL
-    cl_uint dimensions; // 0 if the command is not a kernel
+    const char *fault;          // why the event's times are not trusted, or NULL if they are
+    cl_uint dimensions;         // 0 if the command is not a kernel
     size_t global[3], local[3]; // work-items, and those of a group, which are 0 if the runtime chose
 } LaunchTime;
 
@@ -155,21 +154,18 @@ typedef struct {
 // may exceed the host's by the timer's resolution and 1 %.
 LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
-// Returns why the event's times are not trusted, or NULL if they are.
-const char *launch_clock_fault(const LaunchTime *time);
-
 // Halves the longest side of a work-group, the last among equals, until it has at most `largest` work-items
 // and no side exceeds its limit.
 void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides);
 
 // Launches the kernel over `items`, with global ids from `first` on, or from 0 if `first` is NULL, and waits.
-// Returns zeros on failure. Reduces `group`, the preferred work-group, to fit the device and the kernel, and
-// rounds the work-items up to whole groups, so a kernel must not rely on either. If `group` is NULL, the
-// runtime chooses and nothing is rounded.
+// Returns a time of 0 with a fault on failure. Reduces `group`, the preferred work-group, to fit the device
+// and the kernel, and rounds the work-items up to whole groups, so a kernel must not rely on either. If
+// `group` is NULL, the runtime chooses and nothing is rounded.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
                          const size_t *items, const size_t *group);
 // Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it. `host_start`
-// is clock_seconds() before the enqueue. Returns zeros on failure.
+// is clock_seconds() before the enqueue. Returns a time of 0 with a fault on failure.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);
 
 // Set argument `index` to a value or a buffer, which may be NULL, with the kernel's name in the detail of a

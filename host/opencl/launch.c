@@ -5,28 +5,25 @@
 
 LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
 {
-    LaunchTime time = {
-        .start_seconds = 1e-9 * (double)start,
-        .end_seconds = 1e-9 * (double)end,
-        .host_seconds = host_seconds,
-    };
-    if (start != 0 && end > start) {
-        time.event_seconds = 1e-9 * (double)(end - start);
-        // Timestamps one tick apart are a counter, not a clock: rusticl's (Mesa 22.3) are 1, 2, 3 …
-        time.trusted = end - start > 1 && time.event_seconds <= 1.01 * host_seconds + resolution_seconds;
-    }
-    return time;
+    const double event_seconds = start != 0 && end > start ? 1e-9 * (double)(end - start) : 0;
+    const char *fault = NULL;
+    if (start == 0 && end == 0)
+        fault = passport_timer_faults[TIMER_ABSENT];
+    else if (end <= start)
+        fault = "the event ends no later than it starts";
+    else if (event_seconds < 1.5e-9) // rusticl's timestamps (Mesa 22.3) are 1, 2, 3 …
+        fault = passport_timer_faults[TIMER_COUNTER];
+    else if (event_seconds > 1.01 * host_seconds + resolution_seconds)
+        fault = "the event is longer than the host waited for it";
+    return (LaunchTime){.start_seconds = 1e-9 * (double)start,
+                        .end_seconds = 1e-9 * (double)end,
+                        .event_seconds = event_seconds,
+                        .host_seconds = host_seconds,
+                        .trusted = !fault,
+                        .fault = fault};
 }
 
-const char *launch_clock_fault(const LaunchTime *time)
-{
-    if (time->trusted) return NULL;
-    if (time->fault) return time->fault;
-    if (time->start_seconds == 0 && time->end_seconds == 0) return "the runtime reports no times for events";
-    if (time->end_seconds <= time->start_seconds) return "the event ends no later than it starts";
-    if (time->event_seconds < 1.5e-9) return "event timestamps are a counter, not a clock";
-    return "the event is longer than the host waited for it";
-}
+static const LaunchTime failed_launch = {.fault = "the command failed"};
 
 // Returns a timestamp of the event, or zero if the runtime has none.
 static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
@@ -38,7 +35,7 @@ static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
 
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start)
 {
-    LaunchTime time = {0};
+    LaunchTime time = failed_launch;
     fault_record_call("clWaitForEvents");
     cl_int waited = clWaitForEvents(1, &event), state = CL_COMPLETE;
     fault_record_call(NULL);
@@ -54,8 +51,9 @@ LaunchTime event_time(Compute *compute, cl_event event, const char *command, dou
         time.queued_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_QUEUED);
         time.submitted_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_SUBMIT);
         time.host_start_seconds = host_start;
-        time.fault = passport_timer_fault(compute->device);
-        time.trusted = time.trusted && !time.fault;
+        const char *timer_fault = passport_timer_fault(compute->device);
+        if (timer_fault) time.fault = timer_fault;
+        time.trusted = !time.fault;
     }
     clReleaseEvent(event);
     return time;
@@ -100,7 +98,7 @@ LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions,
                          const size_t *items, const size_t *group)
 {
     if (!compute_check(compute, compute->unmap_failure.status, compute->unmap_failure.call))
-        return (LaunchTime){0};
+        return failed_launch;
     size_t global[3], local[3];
     for (cl_uint i = 0; i < dimensions; i++)
         local[i] = group ? group[i] : 1;
@@ -111,7 +109,7 @@ LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions,
     cl_event event;
     if (!compute_try(compute, clEnqueueNDRangeKernel(compute->queue, kernel, dimensions, first, global,
                                                      group ? local : NULL, 0, NULL, &event)))
-        return (LaunchTime){0};
+        return failed_launch;
     LaunchTime time = event_time(compute, event, "clEnqueueNDRangeKernel", host_start);
     time.dimensions = dimensions;
     memcpy(time.global, global, dimensions * sizeof *global);

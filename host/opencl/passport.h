@@ -88,6 +88,7 @@ const Passport *passport_at(const Device *device, size_t index);
 // Returns whether the driver promises correctly rounded quotients and roots, and nothing refuted that.
 bool passport_rounds_correctly(const Passport *passport);
 
+extern const char *const passport_timer_faults[]; // by TimerFault, in words; NULL if sound
 // Returns why the events' times of the device are not trusted, or NULL if they are or nothing is known.
 const char *passport_timer_fault(const Device *device);
 

@@ -19,7 +19,7 @@ bool passport_rounds_correctly(const Passport *passport)
            passport->roots.wrong_count == 0;
 }
 
-static const char *const timer_faults[] = {
+const char *const passport_timer_faults[] = {
     [TIMER_SOUND] = NULL,
     [TIMER_ABSENT] = "the runtime reports no times for events",
     [TIMER_COUNTER] = "event timestamps are a counter, not a clock",
@@ -31,7 +31,7 @@ const char *passport_timer_fault(const Device *device)
 {
     const char *fault = NULL;
     for (size_t i = 0; i < passport_count(device) && !fault; i++)
-        fault = timer_faults[passport_at(device, i)->timer.fault];
+        fault = passport_timer_faults[passport_at(device, i)->timer.fault];
     return fault;
 }
 
@@ -96,7 +96,7 @@ static Finding timers_finding(const TimerFindings *timer, Text *text)
         text_appendf(text, "nanoseconds, in steps of %" PRIu64, timer->step_nanoseconds);
         return FINDING_SOUND;
     }
-    text_appendf(text, "%s", timer_faults[timer->fault]);
+    text_appendf(text, "%s", passport_timer_faults[timer->fault]);
     if (timer->fault == TIMER_UNIT) text_appendf(text, " but some %.2g of them", timer->tick_nanoseconds);
     return FINDING_UNUSUAL;
 }
