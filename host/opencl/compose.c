@@ -85,8 +85,3 @@ char *kernel_compose(const EmbeddedFile *files, const char *root, const char *pr
     free(composer.included);
     return composer.text.items;
 }
-
-char *program_text(const char *root, const char *prelude)
-{
-    return kernel_compose(kernel_files, root, prelude);
-}

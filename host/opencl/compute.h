@@ -115,9 +115,6 @@ void program_close(Program *program);
 // Returns the key of the cache for a request's program. The caller frees it.
 char *program_key(const Device *device, const ProgramRequest *request);
 
-// Returns the prelude followed by the text of `root` with its includes, as kernel_compose does. The caller
-// frees it.
-char *program_text(const char *root, const char *prelude);
 // Returns the text of a request's program. The caller frees it.
 char *program_request_text(const ProgramRequest *request, bool is_out_of_line);
 

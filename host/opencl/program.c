@@ -27,8 +27,8 @@ void program_options_append(Text *text, const Device *device, const char *option
 
 char *program_request_text(const ProgramRequest *request, bool is_out_of_line)
 {
-    return program_text(request->root,
-                        or_empty(is_out_of_line ? request->out_of_line_prelude : request->prelude));
+    return kernel_compose(kernel_files, request->root,
+                          or_empty(is_out_of_line ? request->out_of_line_prelude : request->prelude));
 }
 
 // Returns a key of everything that the compiled program depends on. The native width distinguishes

@@ -66,11 +66,6 @@ void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, co
             device_scene_set_arguments(kernels->scene, variant->slots[type].program.kernel);
 }
 
-char *kernels_text(const Kernels *kernels)
-{
-    return program_text(kernel_sources[KERNEL_RENDER].file, text_c(&kernels->variant.prelude));
-}
-
 static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
 {
     Compute *compute = kernels->scene->compute;

@@ -55,5 +55,3 @@ cl_kernel kernels_get(Kernels *kernels, KernelType type);
 // by its event if that is trusted, else by the host's clock.
 double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, const size_t *first,
                       const size_t *items, const size_t *group);
-// Returns the composed text of the kernel that renders. The caller frees it.
-char *kernels_text(const Kernels *kernels);
