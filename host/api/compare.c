@@ -2,6 +2,7 @@
 #include "host/api/handles.h"
 
 #include "host/base/memory.h"
+#include "host/base/numbers.h"
 #include "host/image/image_metrics.h"
 #include <math.h>
 #include <stdlib.h>
@@ -35,8 +36,7 @@ static Image image_of_array(const GlintImagePair *pair, const void *array)
     image.doubles = (double *)(uintptr_t)array;
     const size_t count = (size_t)image.width * image.height * image.channels;
     image.values = memory_allocate(count, sizeof *image.values);
-    for (size_t i = 0; i < count; i++)
-        image.values[i] = (float)image.doubles[i];
+    numbers_narrow(image.values, image.doubles, count);
     return image;
 }
 

@@ -44,12 +44,6 @@ bool struct_has_size(const void *given, size_t size_min, const char *type, Messa
 // Returns whether a type of numbers is known, and adds a message if not.
 bool real_is_known(GlintReal real, MessageList *messages);
 
-// Returns a number of a caller's array.
-static inline double real_at(GlintReal real, const void *reals, size_t index)
-{
-    return real == GLINT_FLOAT32 ? (double)((const float *)reals)[index] : ((const double *)reals)[index];
-}
-
 // Converts a precision. Returns false with a message if it is invalid.
 bool precision_read(Precision *precision, GlintPrecision given, MessageList *messages);
 

@@ -43,7 +43,8 @@ void glint_tracer_close(GlintTracer *tracer)
 static void reals_read(double *values, size_t count, GlintReal real, const void *reals, size_t first)
 {
     for (size_t i = 0; i < count; i++)
-        values[i] = real_at(real, reals, first + i);
+        values[i] = real == GLINT_FLOAT32 ? (double)((const float *)reals)[first + i]
+                                          : ((const double *)reals)[first + i];
 }
 
 static void ray_read(TraceRay *ray, const GlintRays *rays, size_t index)

@@ -1,6 +1,7 @@
 #include "host/api/handles.h"
 
 #include "host/base/memory.h"
+#include "host/base/numbers.h"
 #include "host/import/number.h"
 #include "host/scene/mesh.h"
 #include <math.h>
@@ -66,13 +67,10 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
 static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, size_t count,
                          MessageList *messages)
 {
-    for (size_t i = 0; i < count; i++) {
-        vectors[i] = (Vector3){real_at(real, reals, 3 * i), real_at(real, reals, 3 * i + 1),
-                               real_at(real, reals, 3 * i + 2)};
-        if (!(fabs(vectors[i].x) <= NUMBER_MAX && fabs(vectors[i].y) <= NUMBER_MAX &&
-              fabs(vectors[i].z) <= NUMBER_MAX))
+    numbers_widen((double *)vectors, reals, 3 * count, real == GLINT_FLOAT64);
+    for (size_t i = 0; i < count; i++)
+        if (!vector_is_within(vectors[i], NUMBER_MAX))
             return message_error(messages, "vertex %zu: expected numbers up to %g", i, NUMBER_MAX);
-    }
     return true;
 }
 
