@@ -165,33 +165,35 @@ static bool secret_read(Secret *secret, int folder)
     return is_read;
 }
 
-// Locks the folder, so that one process at a time makes or removes the hash's key and writes entries with
-// it. Without locks, entries may be lost. Returns a descriptor to close, or -1.
-static int folder_lock(int folder)
+// Locks the folder until it is closed, so that one process at a time makes or removes the hash's key and
+// writes entries with it. Without locks, entries may be lost.
+static void folder_lock(int folder)
 {
-    int locked = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    while (locked >= 0 && flock(locked, LOCK_EX) != 0 && errno == EINTR)
+    while (flock(folder, LOCK_EX) != 0 && errno == EINTR)
         continue;
-    return locked;
+}
+
+// Writes a private file of the folder. Returns false if that fails, since the cache only saves time.
+static bool file_write(int folder, const char *name, const void *bytes, size_t size)
+{
+    MessageList ignored = {0};
+    OutputFile output;
+    bool is_written = output_open_private(&output, folder, name, &ignored);
+    if (is_written && !output_write(&output, bytes, size, &ignored)) {
+        output_abandon(&output);
+        is_written = false;
+    }
+    is_written = is_written && output_commit(&output, &ignored);
+    message_list_free(&ignored);
+    return is_written;
 }
 
 // Reads the hash's key, after replacing one that is absent or cannot be trusted. Returns false if there is
 // none then. The folder must be locked.
 static bool secret_make(Secret *secret, int folder)
 {
-    bool has_secret = secret_read(secret, folder);
-    if (!has_secret && getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES) {
-        MessageList ignored = {0};
-        OutputFile output;
-        if (output_open_private(&output, folder, secret_name, &ignored)) {
-            if (output_write(&output, secret->bytes, SECRET_BYTES, &ignored))
-                has_secret = output_commit(&output, &ignored);
-            else
-                output_abandon(&output);
-        }
-        message_list_free(&ignored);
-    }
-    return has_secret;
+    return secret_read(secret, folder) || (getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES &&
+                                           file_write(folder, secret_name, secret->bytes, SECRET_BYTES));
 }
 
 typedef struct {
@@ -379,32 +381,26 @@ void cache_trim(uint64_t bytes_max, WarningReceiver *warnings)
     warnings_deliver(warnings, &messages);
 }
 
-static bool entry_write(OutputFile *output, const CacheHeader *header, const char *key, const Text *binary,
-                        MessageList *messages)
-{
-    return output_write(output, header, sizeof *header, messages) &&
-           output_write(output, key, strlen(key), messages) &&
-           output_write(output, binary->items, binary->count, messages) && output_commit(output, messages);
-}
-
 void cache_store(const char *key, const Text *binary, WarningReceiver *warnings)
 {
     CacheHeader header = header_of(strlen(key), binary->count);
     if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
     MessageList messages = {0}, ignored = {0};
-    int folder = folder_open(true, &messages), locked = folder >= 0 ? folder_lock(folder) : -1;
+    int folder = folder_open(true, &messages);
     Secret secret;
-    if (locked >= 0 && secret_make(&secret, folder)) {
+    if (folder >= 0) folder_lock(folder);
+    if (folder >= 0 && secret_make(&secret, folder)) {
+        Text entry = {0};
         entry_tag(header.tag, &secret, &header, key, text_c(binary));
-        OutputFile output;
-        if (output_open_private(&output, folder, entry_name(key).text, &ignored) &&
-            !entry_write(&output, &header, key, binary, &ignored))
-            output_abandon(&output);
+        text_append(&entry, (const char *)&header, sizeof header);
+        text_append(&entry, key, strlen(key));
+        text_append(&entry, text_c(binary), binary->count);
+        file_write(folder, entry_name(key).text, entry.items, entry.count);
+        text_free(&entry);
         folder_trim(folder, CACHE_BYTES_MAX, &ignored);
+        message_list_free(&ignored);
     }
-    if (locked >= 0) close(locked);
     if (folder >= 0) close(folder);
-    message_list_free(&ignored);
     warnings_deliver(warnings, &messages);
 }
 
@@ -445,10 +441,9 @@ bool cache_clear(MessageList *messages)
 {
     int folder = folder_open(false, messages);
     if (folder < 0) return messages->count == 0;
-    int locked = folder_lock(folder);
+    folder_lock(folder);
     bool is_cleared = folder_trim(folder, 0, messages);
     is_cleared &= file_remove(folder, secret_name, messages);
-    if (locked >= 0) close(locked);
     close(folder);
     return is_cleared;
 }
