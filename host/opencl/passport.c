@@ -5,7 +5,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/opencl/cache.h"
-#include "host/opencl/passport_measure.h"
 #include "host/opencl/passport_probe.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,9 +1,7 @@
-#include "host/opencl/passport_measure.h"
+#include "host/opencl/passport_probe.h"
 
 #include "host/base/array.h"
 #include "host/base/clock.h"
-#include "host/opencl/passport_quotients.h"
-#include "host/opencl/passport_time.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>

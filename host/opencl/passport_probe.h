@@ -1,4 +1,5 @@
-// Launches the probes of kernels/passport.cl. The host checks all results of the device.
+// Measures a passport in parts, which launch the probes of kernels/passport.cl. The host checks all results
+// of the device.
 #pragma once
 
 #include "host/base/array.h"
@@ -65,6 +66,18 @@ uint64_t probe_random_bits(Measurement *measurement); // 64 random bits
 double probe_random_real(Measurement *measurement, int span);
 // Makes OPERANDS_MAX pairs of random reals, some of whose sums cancel or end in half an ulp.
 void reals_make(Measurement *measurement, Reals *reals, Operands *operands);
+
+// Measures the passport with the parts below. Returns false if the device failed.
+bool passport_measure(Passport *passport, Compute *compute, PassportMode mode, uint32_t lanes,
+                      bool is_thorough, bool no_cache);
+// Returns the ratio of fma's time to that of a product and a sum, each without the time of an empty launch.
+// Each time is the shortest of alternating launches, of which there are more if fma seems slow, since that
+// may be chance. Sets timed_rounds.
+double fma_cost(Measurement *measurement);
+// Sets the passport's timer from all launches so far and some more. Call fma_cost first.
+void timer_measure(Measurement *measurement);
+// Sets the passport's quotients and roots. A thorough measurement uses the rest of PASSPORT_SECONDS_MAX.
+void quotients_measure(Measurement *measurement);
 
 static inline size_t scalar_size(const Measurement *measurement)
 {

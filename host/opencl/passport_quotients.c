@@ -1,4 +1,5 @@
-#include "host/opencl/passport_quotients.h"
+// Measures how exactly a device divides and takes square roots.
+#include "host/opencl/passport_probe.h"
 
 #include "host/base/array.h"
 #include "host/base/clock.h"

@@ -1,4 +1,5 @@
-#include "host/opencl/passport_time.h"
+// Measures the cost of fma and the behavior of a device's event timers.
+#include "host/opencl/passport_probe.h"
 
 #include <math.h>
 
