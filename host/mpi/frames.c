@@ -7,6 +7,7 @@
 #include "host/cli/options.h"
 #include "host/mpi/messages.h"
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -105,7 +106,7 @@ typedef struct {
     size_t next, end;       // frames that were not dealt yet
     ARRAY_OF(size_t) again; // of ranks whose devices failed
     size_t workers, dealt;  // workers whose devices work, frames that are being rendered
-    bool has_ended;
+    atomic_bool has_ended;
 } Deal;
 
 // Returns the next frame, or NO_FRAME. There may be one later if a rank that has one fails.
@@ -151,13 +152,6 @@ static bool deal_is_over(Deal *deal)
         deal->has_ended || (deal->dealt == 0 && deal->again.count == 0 && deal->next == deal->end);
     pthread_mutex_unlock(&deal->mutex);
     return is_over;
-}
-
-static void deal_end(Deal *deal)
-{
-    pthread_mutex_lock(&deal->mutex);
-    deal->has_ended = true;
-    pthread_mutex_unlock(&deal->mutex);
 }
 
 static void *own_frames_render(void *context)
@@ -215,7 +209,7 @@ static void frames_serve(Deal *deal, size_t other_count)
         MPI_Status status;
         bool is_busy = has_message(MPI_ANY_SOURCE, TAG_FRAME_DONE, &status);
         if (is_busy) frame_done_receive(deal, &states[status.MPI_SOURCE - 1], status.MPI_SOURCE);
-        if (is_interrupted()) deal_end(deal);
+        if (is_interrupted()) deal->has_ended = true;
         over_count = 0;
         for (size_t i = 0; i < other_count; i++) {
             is_busy |= frame_send(deal, &states[i], (int)i + 1);
