@@ -62,7 +62,7 @@ static void scene_send(void *context, SceneVariant variant, const CompiledScene 
     Order order = {ORDER_SCENE, variant};
     CompiledScene sent = *compiled;
     broadcast(&order, sizeof order, MPI_COMM_WORLD);
-    scene_broadcast(&sent, 0, true);
+    scene_broadcast(&sent, true);
 }
 
 // What the first rank knows about another one.

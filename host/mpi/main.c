@@ -25,7 +25,7 @@ int main(int argument_count, char **arguments)
     if (rank == 0)
         status = first_rank_run((size_t)size - 1, argument_count, arguments);
     else
-        other_rank_run(rank, (size_t)local_rank, argument_count, arguments);
+        other_rank_run((size_t)local_rank, argument_count, arguments);
     MPI_Finalize();
     return status;
 }

@@ -66,26 +66,22 @@ void end_await(bool *has_ended)
     *has_ended = true;
 }
 
-// Broadcasts the struct and the items of its arrays. Renderers that do not move the scene read nothing else.
-static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm ranks)
+void scene_broadcast(CompiledScene *compiled, bool takes)
 {
+    int rank;
+    MPI_Comm ranks;
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    MPI_Comm_split(MPI_COMM_WORLD, takes ? 0 : MPI_UNDEFINED, rank, &ranks);
+    if (ranks == MPI_COMM_NULL) return;
     broadcast(compiled, sizeof *compiled, ranks);
-    if (!is_sender) {
+    if (rank != 0) {
         compiled->textures = NULL;
         compiled->instances = NULL;
     }
     for (size_t type = 0; type < FLAT_COUNT; type++) {
         FlatArray *array = &compiled->arrays[type];
-        if (!is_sender) array->items = memory_allocate_large(array->count, array->layout.size);
+        if (rank != 0) array->items = memory_allocate_large(array->count, array->layout.size);
         broadcast(array->items, array->count * array->layout.size, ranks);
     }
-}
-
-void scene_broadcast(CompiledScene *compiled, int rank, bool takes)
-{
-    MPI_Comm ranks;
-    MPI_Comm_split(MPI_COMM_WORLD, rank == 0 || takes ? 0 : MPI_UNDEFINED, rank, &ranks);
-    if (ranks == MPI_COMM_NULL) return;
-    compiled_broadcast(compiled, rank == 0, ranks);
     MPI_Comm_free(&ranks);
 }

@@ -11,9 +11,9 @@
 //    instead if a rank has no device or the image cannot be rendered.
 // 3. Each other rank sends TAG_REQUEST, receives TAG_ROWS and sends the band of these rows as TAG_BAND and
 //    TAG_LAYERS, until it receives no rows or TAG_END or its device fails. Then it sends TAG_DONE.
-// 4. The first rank sends TAG_END to each other rank once: when all rows are rendered, when the user
+// 4. The first rank sends TAG_END to each other rank once, when all rows are rendered, when the user
 //    interrupts, or after that rank's TAG_DONE. The rank then waits for the next Job.
-// A rank that reports a failure, or sends anything but its rows, is dropped with a warning: the others render
+// A rank that reports a failure, or sends anything but its rows, is dropped with a warning. The others render
 // its rows, its bands are discarded, and its requests are answered with no rows.
 //
 // JOB_FRAMES: each rank renders whole frames alone.
@@ -30,11 +30,11 @@
 
 enum {
     TAG_REQUEST,    // a Request
-    TAG_ROWS,       // BandRows, the answer; no rows: the end
+    TAG_ROWS,       // BandRows, the answer, without rows at the end
     TAG_BAND,       // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,     // a layer, in several messages if it is large
     TAG_END,        // no bytes
-    TAG_DONE,       // a rank's last message: why its device failed, or an empty text
+    TAG_DONE,       // a rank's last message, why its device failed or an empty text
     TAG_FRAME_DONE, // the status of a rank's frame; EXIT_DONE before the first
     TAG_FRAME,      // the index of the next frame, or NO_FRAME
 };
@@ -74,6 +74,7 @@ bool end_poll(void *has_ended);
 // Waits for TAG_END unless it was received.
 void end_await(bool *has_ended);
 
-// Sends a compiled scene from the first rank to those with `takes`, which allocate its arrays. All ranks
-// call it. A rank that does not take the scene leaves `compiled` unchanged.
-void scene_broadcast(CompiledScene *compiled, int rank, bool takes);
+// Sends a compiled scene, without what only moves of the scene read, from the first rank to the others with
+// `takes`, which allocate its arrays. All ranks call it, the first with `takes`. A rank that does not take
+// the scene leaves `compiled` unchanged.
+void scene_broadcast(CompiledScene *compiled, bool takes);

@@ -30,11 +30,9 @@ static bool band_send(void *has_ended, const Film *band)
 
 // The state of this rank's renderer.
 typedef struct {
-    int rank;
     size_t local_rank;
-    OpenDevice device;
-    bool is_open;
-    Renderer *renderer; // NULL: cannot render, for a reason in `messages` or the device
+    OpenDevice device;  // zeroed while no device is open
+    Renderer *renderer; // NULL if it cannot render, for a reason in `messages` or the device
     MessageList messages;
     Rank self;
 } RankRenderer;
@@ -43,11 +41,8 @@ static void device_close_quietly(RankRenderer *worker)
 {
     renderer_close(worker->renderer);
     worker->renderer = NULL;
-    if (worker->is_open) {
-        compute_close(&worker->device.compute);
-        device_list_close(&worker->device.devices);
-    }
-    worker->is_open = false;
+    compute_close(&worker->device.compute);
+    device_list_close(&worker->device.devices);
 }
 
 // Prepares for another image. Reopens a device that failed.
@@ -57,20 +52,17 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
     *self = (Rank){0};
     gethostname(self->host, sizeof self->host - 1);
     Compute *compute = &worker->device.compute;
-    if (worker->is_open && !compute_ok(compute)) device_close_quietly(worker);
-    if (!worker->is_open) {
+    if (!compute_ok(compute)) device_close_quietly(worker);
+    if (!compute->device) {
         device_list_open(&worker->device.devices, &device_warnings);
         const Device *device =
             device_choose_numbered(&worker->device.devices, selector, worker->local_rank, &worker->messages);
-        worker->is_open = device != NULL;
-        if (device)
-            compute_open(compute, device);
-        else
+        if (!device) {
+            snprintf(self->failure, sizeof self->failure, "%s", worker->messages.items[0].text);
             device_list_close(&worker->device.devices);
-    }
-    if (!worker->is_open) {
-        snprintf(self->failure, sizeof self->failure, "%s", worker->messages.items[0].text);
-        return;
+            return;
+        }
+        compute_open(compute, device);
     }
     worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
     rank_set_device(self, compute->device);
@@ -83,7 +75,7 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
 {
     CompiledScene compiled;
     const bool takes = worker->self.lanes[variant.pass] == variant.lanes;
-    scene_broadcast(&compiled, worker->rank, takes);
+    scene_broadcast(&compiled, takes);
     if (!takes) return;
     if (!worker->renderer) {
         compiled_scene_free(&compiled);
@@ -129,10 +121,10 @@ static void job_run(RankRenderer *worker, const Job *job)
     message_list_free(&worker->messages);
 }
 
-void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
+void other_rank_run(size_t local_rank, int argument_count, char **arguments)
 {
     interrupts_ignore(); // signals reach every rank, but only the first rank acts on them
-    RankRenderer worker = {.rank = rank, .local_rank = local_rank};
+    RankRenderer worker = {.local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.type != JOB_END) {
         if (job.type == JOB_FRAMES)

@@ -5,4 +5,4 @@
 
 // Runs until the first rank has no more images. `local_rank` is its number on this machine, by which ranks
 // share the devices. The arguments are the first rank's.
-void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments);
+void other_rank_run(size_t local_rank, int argument_count, char **arguments);
