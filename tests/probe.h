@@ -117,6 +117,14 @@ static inline cl_program probe_program(const char *text, uint32_t lanes, Precisi
     return program;
 }
 
+static inline cl_kernel probe_kernel(cl_program program, const char *name)
+{
+    cl_int status;
+    cl_kernel kernel = clCreateKernel(program, name, &status);
+    compute_check_object(&probe_compute, kernel, status, "clCreateKernel");
+    return kernel;
+}
+
 // Finds closest hits with every feature built in, so that one program serves all scenes. Returns false, after
 // printing the reason, if the device cannot.
 static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const TraceRay *rays,

@@ -116,7 +116,7 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
     OWNED void *row_bytes = memory_allocate(row_size, 1);
     flat_array_write(&row, trial->is_double, row_bytes);
 
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "misses");
+    cl_kernel kernel = probe_kernel(program, "misses");
     const size_t count = SPHERES_PER_ORIGIN, missed_size = SPHERES_PER_ORIGIN * sizeof(int);
     cl_mem buffers[] = {buffer_create(&probe_compute, lines_size, lines, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, row_size, row_bytes, CL_MEM_READ_ONLY),

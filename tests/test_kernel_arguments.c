@@ -75,7 +75,7 @@ TEST(arguments_are_counted)
     cl_program program = program_with_arguments(
         "kernel void many(global int *a, global float *b, constant float *c, uint d, uint4 e, "
         "global const int *f, uint g)\n{\n    if (d + e.x + g > 0) *a = *f + (int)*b + (int)*c;\n}\n");
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "many");
+    cl_kernel kernel = probe_kernel(program, "many");
     const Arguments arguments = arguments_of(kernel, "many");
     assert_int_equal(arguments.buffer_count, 4);
     assert_int_equal(arguments.byte_count, 3 * 8 + 4 + 4 + 16 + 8 + 4); // 4 of padding before the uint4

@@ -212,7 +212,7 @@ static cl_program program_make(bool is_double)
 static void kernel_run(cl_program program, const char *name, void *first, size_t first_size, void *second,
                        size_t second_size, uint32_t number)
 {
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, name);
+    cl_kernel kernel = probe_kernel(program, name);
     cl_mem buffers[] = {buffer_create(&probe_compute, first_size, first, CL_MEM_READ_WRITE),
                         buffer_create(&probe_compute, second_size, second, CL_MEM_READ_WRITE)};
     kernel_argument(&probe_compute, kernel, 0, sizeof(cl_mem), &buffers[0]);

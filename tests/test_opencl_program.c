@@ -81,17 +81,16 @@ static void run_triple(void *result)
     run->is_pocl = strstr(compute->device->platform_name, "Portable Computing Language") != NULL;
     run->compiled_before_launch = count_shared_objects();
 
-    cl_kernel kernel = program_kernel(compute, &program, "triple");
     cl_mem buffer = buffer_create(compute, sizeof run->values, NULL, CL_MEM_READ_WRITE);
-    kernel_argument(compute, kernel, 0, sizeof buffer, &buffer);
-    LaunchTime time = kernel_launch(compute, kernel, 1, NULL, (const size_t[]){16}, (const size_t[]){8});
+    kernel_argument(compute, program.kernel, 0, sizeof buffer, &buffer);
+    LaunchTime time =
+        kernel_launch(compute, program.kernel, 1, NULL, (const size_t[]){16}, (const size_t[]){8});
     run->times_sound = time.host_seconds > 0 && (!time.trusted || time.event_seconds > 0);
     run->compiled_after_launch = count_shared_objects();
     buffer_read(compute, buffer, sizeof run->values, run->values);
 
     program_store(compute, &run->request, &program);
     buffer_release(buffer);
-    if (kernel) clReleaseKernel(kernel);
     program_close(&program);
     program_close(&program);
     opened_close(&opened);
@@ -111,7 +110,8 @@ static Run run_in_child(ProgramRequest request)
 
 static ProgramRequest triple_request(void)
 {
-    return (ProgramRequest){.root = "features.h", .prelude = triple, .launch = "triple 8"};
+    return (ProgramRequest){
+        .root = "features.h", .prelude = triple, .kernel = "triple", .launch = "triple 8"};
 }
 
 static void drivers_own_cache_empty(void)
@@ -365,9 +365,7 @@ static void use_an_absent_argument(void *result)
     opened_open(&opened, NULL);
     Program program;
     program_build(&opened.compute, &run->request, &program);
-    cl_kernel kernel = program_kernel(&opened.compute, &program, "triple");
-    kernel_argument(&opened.compute, kernel, 7, sizeof(cl_int), &(cl_int){0});
-    clReleaseKernel(kernel);
+    kernel_argument(&opened.compute, program.kernel, 7, sizeof(cl_int), &(cl_int){0});
     program_close(&program);
     opened_close(&opened);
 }

@@ -46,7 +46,7 @@ static void kernel_run(cl_program program, const char *name, size_t work_items, 
                        size_t input_count, size_t count)
 {
     const size_t size = OPERAND_COUNT * sizeof **numbers;
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, name);
+    cl_kernel kernel = probe_kernel(program, name);
     cl_mem buffers[ARRAYS_MAX];
     for (size_t i = 0; i < count; i++) {
         const bool is_input = i < input_count;

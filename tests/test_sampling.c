@@ -30,7 +30,7 @@ static Points *points_make(bool is_double, int32_t column, int32_t row, uint32_t
 {
     cl_program program =
         probe_program(text, 1, is_double ? PRECISION_DOUBLE : PRECISION_STRICT, true, 0, "-cl-std=CL1.2");
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "points");
+    cl_kernel kernel = probe_kernel(program, "points");
     Points *points = memory_allocate(1, sizeof *points);
     cl_mem square = buffer_create(&probe_compute, sizeof points->square, NULL, CL_MEM_READ_WRITE),
            disc = buffer_create(&probe_compute, sizeof points->disc, NULL, CL_MEM_READ_WRITE);

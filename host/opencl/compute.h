@@ -108,8 +108,6 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
 // because PoCL compiles a kernel at its first launch, a binary holds only the kernels launched by then, and
 // a program loaded from it always returns that same binary (3.1; hence `launch` in the key).
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
-// Creates a kernel, which clReleaseKernel releases. Returns NULL on failure.
-cl_kernel program_kernel(Compute *compute, const Program *program, const char *name);
 void program_close(Program *program);
 
 // Returns the key of the cache for a request's program. The caller frees it.

@@ -16,17 +16,17 @@ ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_
                  "#define PERTURB_SEED 0u\n#define PERTURB_SCALE 1\n",
                  lanes, mode == PASSPORT_STRICT, mode == PASSPORT_DOUBLE, mode == PASSPORT_STRICT, has_fma);
     return (ProgramRequest){.root = "passport.cl",
+                            .kernel = "passport",
                             .launch = "passport",
                             .prelude = text_c(prelude),
                             .options = passport_build_options(device, mode),
                             .no_cache = no_cache};
 }
 
-// Releases the kernel and its program without storing the program. The passport is stored instead, and a
+// Releases the program without storing the program. The passport is stored instead, and a
 // driver that crashes when asked for a binary would prevent the render.
 void probe_kernel_close(Measurement *measurement)
 {
-    if (measurement->kernel) clReleaseKernel(measurement->kernel);
     program_close(&measurement->program);
     text_free(&measurement->prelude);
 }
@@ -35,14 +35,15 @@ LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, 
                         cl_uint operand_count, cl_uint count)
 {
     Compute *compute = measurement->compute;
+    cl_kernel kernel = measurement->program.kernel;
     const cl_uint numbers[] = {probe, first, round_count, operand_count};
     for (cl_uint i = 0; i < 4; i++)
-        kernel_argument(compute, measurement->kernel, i, sizeof numbers[i], &numbers[i]);
-    kernel_buffer(compute, measurement->kernel, 4, measurement->operands);
-    kernel_argument(compute, measurement->kernel, 5, sizeof count, &count);
-    kernel_buffer(compute, measurement->kernel, 6, measurement->results);
+        kernel_argument(compute, kernel, i, sizeof numbers[i], &numbers[i]);
+    kernel_buffer(compute, kernel, 4, measurement->operands);
+    kernel_argument(compute, kernel, 5, sizeof count, &count);
+    kernel_buffer(compute, kernel, 6, measurement->results);
     const size_t items = count / measurement->passport->lanes;
-    const LaunchTime time = kernel_launch(compute, measurement->kernel, 1, NULL, &items, NULL);
+    const LaunchTime time = kernel_launch(compute, kernel, 1, NULL, &items, NULL);
     if (compute_ok(compute)) array_push(measurement->launches, time);
     return time;
 }
@@ -68,7 +69,6 @@ void probe_kernel_open(Measurement *measurement, bool has_fma)
     measurement->request = passport_request(measurement->compute->device, passport->mode, passport->lanes,
                                             has_fma, measurement->no_cache, &measurement->prelude);
     program_build(measurement->compute, &measurement->request, &measurement->program);
-    measurement->kernel = program_kernel(measurement->compute, &measurement->program, "passport");
     const Operands zero = {0};
     operands_write(measurement, &zero, 1);
     probe_launch(measurement, PROBE_SUM_PRODUCT, 0, 0, 1, OPERANDS_MAX);

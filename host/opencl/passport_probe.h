@@ -28,7 +28,6 @@ typedef struct {
     ProgramRequest request;
     Text prelude;
     Program program;
-    cl_kernel kernel;
     cl_mem operands, results;
     ARRAY_OF(LaunchTime) launches;
     cl_uint timed_rounds; // of chains that are long enough to be timed

@@ -100,7 +100,7 @@ static void cache_disk_describe(Text *text)
 typedef struct {
     cl_program program;
     cl_kernel kernel;
-    const char *failed_call; // NULL: none
+    const char *failed_call; // or NULL
     cl_int status;
 } Build;
 
@@ -310,16 +310,6 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
     free(texts[1]);
     program->build_seconds = clock_seconds() - start;
     return compute_ok(compute);
-}
-
-cl_kernel program_kernel(Compute *compute, const Program *program, const char *name)
-{
-    if (!compute_ok(compute)) return NULL;
-    cl_int status;
-    fault_record_call("clCreateKernel");
-    cl_kernel kernel = clCreateKernel(program->program, name, &status);
-    compute_check_object(compute, kernel, status, "clCreateKernel");
-    return kernel;
 }
 
 static bool program_query(const Program *program, cl_program_info what, size_t size, void *value)
