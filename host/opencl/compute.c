@@ -73,9 +73,7 @@ bool compute_check_reference(Compute *compute)
 
 bool compute_check(Compute *compute, cl_int status, const char *call)
 {
-    fault_record_call(NULL);
-    if (status != CL_SUCCESS) failure_keep(compute, call, status, NULL);
-    return compute_ok(compute);
+    return compute_check_object(compute, compute, status, call);
 }
 
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call)
