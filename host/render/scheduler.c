@@ -1,7 +1,7 @@
-// Guided self-scheduling (Polychronopoulos and Kuck, 1987, "Guided Self-Scheduling") with shares by pace: a
-// worker gets at most half of its share of the remaining rows, so that the last bands are short. A worker
-// whose pace is unknown gets one step, since it may be a thousand times slower than the others. A worker that
-// would end after another could have rendered all remaining rows gets nothing more.
+// Implements guided self-scheduling (Polychronopoulos and Kuck, 1987) with shares by pace. A worker gets at
+// most half of its share of the remaining rows, so that the last bands are short. A worker whose pace is
+// unknown gets one step, since it may be a thousand times slower than the others. A worker that would end
+// after another could have rendered all remaining rows gets nothing more.
 //
 // These invariants hold whenever the mutex is free:
 //
@@ -45,7 +45,8 @@ struct Scheduler {
     uint32_t delivered_rows; // to the sink
     bool is_delivering, has_ended;
     WorkerState *workers;
-    bool *is_free;          // by row: neither taken nor rendered
+    size_t active_count;    // workers that are not dropped
+    bool *is_free;          // whether each row is neither taken nor rendered
     uint32_t free_count;    // the number of these rows
     ARRAY_OF(Film) waiting; // copies, which have no layers if the checkpoint has them
     size_t row_bytes;       // memory per row of a waiting band; 0 if none or unknown
@@ -75,16 +76,15 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
 static double share_of(const Scheduler *scheduler, size_t worker)
 {
     double sum = 0;
-    size_t known = 0, active = 0;
+    size_t known = 0;
     for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
-        const WorkerState *other = &scheduler->workers[i];
-        if (other->is_dropped) continue;
-        active++;
-        known += other->rows_per_second > 0;
-        sum += other->rows_per_second;
+        const double pace = scheduler->workers[i].rows_per_second;
+        if (scheduler->workers[i].is_dropped) continue;
+        known += pace > 0;
+        sum += pace;
     }
-    double mean = sum / (double)known;
-    return scheduler->workers[worker].rows_per_second / (mean * (double)active);
+    const double mean = sum / (double)known;
+    return scheduler->workers[worker].rows_per_second / (mean * (double)scheduler->active_count);
 }
 
 // Adds rows to the free ones, or removes them, all of which are there.
@@ -102,14 +102,6 @@ static BandRows rows_first(const Scheduler *scheduler)
                    left = scheduler->settings.row_count - first_row;
     const bool *end = memchr(first, false, left);
     return (BandRows){first_row, end ? (uint32_t)(end - first) : left};
-}
-
-// Returns whether all other workers are dropped or never existed.
-static bool is_alone(const Scheduler *scheduler, size_t worker)
-{
-    for (size_t i = 0; i < scheduler->settings.worker_count; i++)
-        if (i != worker && !scheduler->workers[i].is_dropped) return false;
-    return true;
 }
 
 // Returns the row where bands must end for now, so that the waiting ones fit into memory. The uppermost
@@ -150,7 +142,7 @@ static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t 
 {
     const BandRows first = rows_first(scheduler);
     uint32_t rows = rows_max, limit = row_limit(scheduler);
-    if (!is_alone(scheduler, worker)) {
+    if (scheduler->active_count > 1) {
         const uint32_t fair = rows_fair(scheduler, worker, step);
         if (rows > fair) rows = fair;
     }
@@ -264,6 +256,7 @@ Scheduler *scheduler_open(const SchedulerSettings *settings)
             of_workers > WAITING_BYTES_MIN ? of_workers : WAITING_BYTES_MIN;
     }
     scheduler->start_seconds = clock_seconds();
+    scheduler->active_count = settings->worker_count;
     scheduler->workers = memory_allocate_zeroed(settings->worker_count, sizeof *scheduler->workers);
     if (pthread_mutex_init(&scheduler->mutex, NULL) != 0 || pthread_cond_init(&scheduler->changed, NULL) != 0)
         fault("out of memory: mutex");
@@ -328,7 +321,7 @@ void scheduler_drop(Scheduler *scheduler, size_t worker)
     dropped->is_dropped = true;
     rows_set_free(scheduler, dropped->rows, true);
     dropped->rows = (BandRows){0};
-    const bool others_continue = !is_alone(scheduler, worker);
+    const bool others_continue = --scheduler->active_count > 0;
     while (scheduler->is_delivering)
         pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
     if (others_continue && scheduler->settings.dropped)
