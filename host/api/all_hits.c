@@ -148,8 +148,6 @@ void glint_all_hits_free(GlintAllHits *hits)
     free(hits->t);
     free(hits->normal);
     free(hits->position);
-    hits->count = 0;
-    hits->ray = NULL;
-    hits->object = NULL;
-    hits->t = hits->normal = hits->position = NULL;
+    const GlintAllHits none = {0};
+    struct_write(hits, &none, sizeof none);
 }

@@ -27,10 +27,8 @@ size_t film_layer_size(const Film *film, Layer layer)
 
 size_t film_size(const Film *film)
 {
-    size_t size = 0;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (film->layers[layer]) size += film_layer_size(film, layer);
-    return size;
+    const FilmHeader header = film_header(film);
+    return (size_t)film_header_size(&header);
 }
 
 FilmHeader film_header(const Film *film)
