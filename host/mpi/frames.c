@@ -170,7 +170,7 @@ static void *own_frames_render(void *context)
 }
 
 typedef struct {
-    size_t frame; // NO_FRAME: none
+    size_t frame; // or NO_FRAME
     bool wants, has_failed, end_sent, is_over;
 } RankFrames;
 

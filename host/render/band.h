@@ -26,8 +26,8 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film);
 void band_buffers_close(BandBuffers *buffers, Pass *pass);
 
-// Maps a layer of the film, as pass_map does: always all of its rows, however many the band has, because
-// NVIDIA's driver takes 1 to 2 ms to map a range whose size differs from the last one's.
+// Maps all rows of a layer of the film as pass_map does, however few the band has, because NVIDIA's driver
+// takes 1 to 2 ms to map a range whose size differs from the last one's.
 void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags access);
 
 // Returns the description of the film of these rows, with no layers.

@@ -62,8 +62,8 @@ static bool array_ignores_eye(size_t type)
            type == FLAT_SKY_CELLS || type == FLAT_TEXTURE_LEVELS || type == FLAT_TEXELS;
 }
 
-// Stages the buffers whose size differs. Then all arrays in them have changed: only scene_compile changes the
-// size of an array, and it writes all but the texels, which have a separate buffer.
+// Stages the buffers whose size differs. All arrays in them have then changed, because only scene_compile
+// changes the size of an array, and it writes all but the texels, which have a separate buffer.
 static void buffers_stage(DeviceScene *scene, const CompiledScene *compiled)
 {
     const SceneLayout layout = scene_layout(scene, compiled);

@@ -88,8 +88,8 @@ static inline uint32_t samples_end(const RenderSettings *settings)
 // Returns false with a message if the settings do not fit the device.
 bool settings_fit(const RenderSettings *settings, const Compute *compute, MessageList *messages);
 
-// The pixels that a pass renders: all of them; at `certified`, then the flagged ones, in double precision
-// with bounds; then those that remain uncertified, so that these equal a render at `double`.
+// The pixels that a pass renders. The first pass renders all of them. At `certified`, the second renders the
+// flagged ones in double precision with bounds, and the third those that remain uncertified as at `double`.
 typedef enum { PASS_ALL, PASS_FLAGGED, PASS_UNCERTIFIED, PASS_COUNT } PixelPass;
 
 // Returns the settings of one pass of an image.

@@ -6,9 +6,9 @@
 #include "host/scene/vector.h"
 #include <stdint.h>
 
-// A ray whose numbers a renderer rounds to its precision. t is measured in lengths of `direction`, which need
-// not be a unit vector: a point of the ray is origin + t direction. Hits lie strictly between tmin and tmax.
-// A direction whose squared length is 0 at the precision (in float, a length below 1e-22) hits nothing. A
+// A ray whose numbers a renderer rounds to its precision. Its points are origin + t direction. `direction`
+// need not be a unit vector, and t is measured in its lengths. Hits lie strictly between tmin and tmax. A
+// direction whose squared length is 0 at the precision (in float, a length below 1e-22) hits nothing. A
 // direction whose squared length is infinite (a length above 1e19) may hit something.
 typedef struct {
     Vector3 origin, direction;
