@@ -4,6 +4,7 @@
 #include "tests/check.h"
 #include "tests/child.h"
 
+#include <inttypes.h>
 #include <jansson.h>
 
 static char *json_printed(Json *json)
@@ -200,6 +201,27 @@ TEST(nesting)
 
     printed = json_printed(json_open());
     assert_string_equal(printed, "{}\n");
+    free(printed);
+}
+
+TEST(template)
+{
+    Json *json = json_open();
+    json_addf(json, "text %s number %g infinite %g holds %d fails %d", "a", 0.25, INFINITY, true, false);
+    json_addf(json, "small %u size %zu large %" PRIu64 " hash %016" PRIx64, 1U, (size_t)2,
+              (uint64_t)INT64_MAX, (uint64_t)255);
+    json_addf(json, "object {a [%u %u] b {c %g}} empty {} rows [", 3U, 4U, 0.5);
+    json_addf(json, "{d %s} {}]", "e");
+    char *printed = json_printed(json);
+    json_t *read = json_loads(printed, 0, NULL);
+    char *line = json_dumps(read, JSON_COMPACT);
+    assert_string_equal(
+        line, "{\"text\":\"a\",\"number\":0.25,\"infinite\":null,\"holds\":true,"
+              "\"fails\":false,\"small\":1,\"size\":2,\"large\":9223372036854775807,"
+              "\"hash\":\"00000000000000ff\",\"object\":{\"a\":[3,4],\"b\":{\"c\":0.5}},\"empty\":{},"
+              "\"rows\":[{\"d\":\"e\"},{}]}");
+    free(line);
+    json_decref(read);
     free(printed);
 }
 

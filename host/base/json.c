@@ -138,6 +138,68 @@ void json_none(Json *json, const char *key)
     json_word(json, key, "null");
 }
 
+// Adds the next of the values, which has the printf conversion that starts at the template's `%`.
+static void json_value(Json *json, const char *key, const char *conversion, size_t length, va_list *values)
+{
+    const char size = conversion[length - 2];
+    char hash[17];
+    switch (conversion[length - 1]) {
+    case 's':
+        json_text(json, key, va_arg(*values, const char *));
+        break;
+    case 'g':
+        json_number(json, key, va_arg(*values, double));
+        break;
+    case 'd':
+        json_bool(json, key, va_arg(*values, int));
+        break;
+    case 'x':
+        snprintf(hash, sizeof hash, "%016" PRIx64, va_arg(*values, uint64_t));
+        json_text(json, key, hash);
+        break;
+    default:
+        json_count(json, key,
+                   size == 'l'   ? va_arg(*values, uint64_t)
+                   : size == 'z' ? va_arg(*values, size_t)
+                                 : va_arg(*values, unsigned));
+    }
+}
+
+void json_addf(Json *json, const char *members, ...)
+{
+    char text[64];
+    const char *key = NULL;
+    va_list values;
+    va_start(values, members);
+    for (size_t length; *members != '\0'; members += length) {
+        length = 1;
+        switch (*members) {
+        case ' ':
+            break;
+        case '{':
+        case '[':
+            json_next(json, key);
+            json_begin(json, *members == '{');
+            key = NULL;
+            break;
+        case '}':
+        case ']':
+            json_end(json);
+            break;
+        case '%':
+            length = strcspn(members, "sgdux") + 1;
+            json_value(json, key, members, length, &values);
+            key = NULL;
+            break;
+        default:
+            length = strcspn(members, " ");
+            snprintf(text, sizeof text, "%.*s", (int)length, members);
+            key = text;
+        }
+    }
+    va_end(values);
+}
+
 Text json_close(Json *json)
 {
     while (json->count)

@@ -19,6 +19,10 @@ void json_int64(Json *json, const char *key, int64_t value);
 void json_count(Json *json, const char *key, uint64_t value);
 void json_bool(Json *json, const char *key, bool value);
 void json_none(Json *json, const char *key);
+// Adds the members that a template of keys and values describes, such as "name %s size [%u %u] error {rmse
+// %g}". %s is a text or NULL; %g a number; %d a bool; %u, %zu or PRIu64 a count; "%016" PRIx64 a hash,
+// which becomes a text of 16 digits.
+void json_addf(Json *json, const char *members, ...) __attribute__((format(printf, 2, 3)));
 // Returns the document with one newline at its end, and frees the writer.
 Text json_close(Json *json);
 // Prints the document and one newline, and frees it.
