@@ -3,6 +3,8 @@
 #include "host/cli/report_json.h"
 
 #include "host/base/file.h"
+#include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
 const ResultTable accuracy_table = {
@@ -45,25 +47,22 @@ static void saved_json(Json *json, const AccuracyReport *report, size_t scene, c
 static void reference_json(Json *json, const AccuracyReport *report, size_t index)
 {
     const AccuracyScene *scene = &report->scenes[index];
+    const char *file = scene->reference.file;
     json_begin_object(json, "reference");
-    json_text(json, "kind", scene->reference.file ? "file" : "render");
-    if (scene->reference.file) {
-        json_text(json, "file", scene->reference.file);
-    } else {
-        json_text(json, "device", scene->reference.device ? scene->reference.device : report->device->name);
-        json_text(json, "precision", scene->reference.precision);
-        json_int64(json, "lanes", scene->reference.lanes);
-        json_text(json, "bvh", scene->reference.bvh);
-        json_int64(json, "samples", scene->reference.samples);
-        hash_json(json, "kernel_hash", scene->reference.kernel_hash);
-    }
-    json_count(json, "nonfinite", scene->reference.nonfinite);
-    json_count(json, "negative", scene->reference.negative);
+    json_text(json, "kind", file ? "file" : "render");
+    if (file)
+        json_text(json, "file", file);
+    else
+        json_addf(json, "device %s precision %s lanes %u bvh %s samples %u kernel_hash %016" PRIx64,
+                  scene->reference.device ? scene->reference.device : report->device->name,
+                  scene->reference.precision, scene->reference.lanes, scene->reference.bvh,
+                  scene->reference.samples, scene->reference.kernel_hash);
+    json_addf(json, "nonfinite %zu negative %zu", scene->reference.nonfinite, scene->reference.negative);
     saved_json(json, report, index, NULL);
     json_end(json);
 
     json_begin_object(json, "edges");
-    if (scene->reference.file) {
+    if (file) {
         unavailable_json(json, "the reference has colors only");
     } else {
         json_count(json, "silhouette", scene->edges.silhouette_pixels);
@@ -73,48 +72,23 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
     json_end(json);
 }
 
-static void edge_count_json(Json *json, const char *key, EdgeCount count)
-{
-    json_begin_object(json, key);
-    json_count(json, "edge", count.edge);
-    json_count(json, "away", count.away);
-    json_end(json);
-}
-
-static void extremes_json(Json *json, const char *key, ErrorExtremes extremes)
-{
-    if (key) json_begin_object(json, key);
-    json_number(json, "max", extremes.largest);
-    json_number(json, "p99_9", extremes.percentile_999);
-    if (key) json_end(json);
-}
-
 static void kinds_json(Json *json, const AccuracyErrors *errors)
 {
-    edge_count_json(json, "object", errors->object);
-    edge_count_json(json, "shadow", errors->shadow);
-    edge_count_json(json, "path", errors->path);
-    if (errors->shading_pixels > 0) {
-        json_begin_object(json, "shading");
-        json_count(json, "pixels", errors->shading_pixels);
-        json_number(json, "max", errors->shading.largest);
-        json_number(json, "rmse", errors->shading.rmse);
-        json_number(json, "p99_9", errors->shading.percentile_999);
-        json_number(json, "bias", errors->shading.bias);
-        json_end(json);
-    } else {
+    const ErrorSummary *shading = &errors->shading;
+    json_addf(json, "object {edge %zu away %zu} shadow {edge %zu away %zu} path {edge %zu away %zu}",
+              errors->object.edge, errors->object.away, errors->shadow.edge, errors->shadow.away,
+              errors->path.edge, errors->path.away);
+    if (errors->shading_pixels > 0)
+        json_addf(json, "shading {pixels %zu max %g rmse %g p99_9 %g bias %g}", errors->shading_pixels,
+                  shading->largest, shading->rmse, shading->percentile_999, shading->bias);
+    else
         missing_json(json, "shading", "no pixel agrees with the reference");
-    }
     if (errors->surface_pixels > 0) {
-        json_begin_object(json, "t");
-        json_count(json, "pixels", errors->surface_pixels);
-        extremes_json(json, "relative", errors->t_relative);
-        extremes_json(json, "ulps", errors->t_ulps);
-        json_end(json);
-        json_begin_object(json, "normal");
-        json_count(json, "pixels", errors->surface_pixels);
-        extremes_json(json, NULL, errors->normal);
-        json_end(json);
+        json_addf(json, "t {pixels %zu relative {max %g p99_9 %g} ulps {max %g p99_9 %g}}",
+                  errors->surface_pixels, errors->t_relative.largest, errors->t_relative.percentile_999,
+                  errors->t_ulps.largest, errors->t_ulps.percentile_999);
+        json_addf(json, "normal {pixels %zu max %g p99_9 %g}", errors->surface_pixels, errors->normal.largest,
+                  errors->normal.percentile_999);
     } else {
         missing_json(json, "t", "no pixel shows the same object");
         missing_json(json, "normal", "no pixel shows the same object");
@@ -123,25 +97,19 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
 
 static void errors_json(Json *json, const AccuracyErrors *errors)
 {
+    const ImageMetrics *display = &errors->display;
     json_begin_object(json, "errors");
-    json_count(json, "nonfinite", errors->nonfinite);
-    json_count(json, "negative", errors->negative);
+    json_addf(json, "nonfinite %zu negative %zu", errors->nonfinite, errors->negative);
     if (errors->why_colors_only)
         for (unsigned measure = 0; measure < ACCURACY_IMAGE; measure++)
             missing_json(json, accuracy_measure_names[measure], errors->why_colors_only);
     else
         kinds_json(json, errors);
-    const ImageMetrics *display = &errors->display;
-    json_begin_object(json, "image");
-    json_number(json, "rmse", errors->image.rmse);
-    json_number(json, "psnr", errors->image.psnr);
-    json_number(json, "rel_mse", errors->image.rel_mse);
-    json_number(json, "srgb_psnr", display->srgb_psnr);
-    json_count(json, "off_by_1", display->off_by_1);
-    json_count(json, "off_by_more", display->off_by_more);
-    json_number(json, "flip_mean", display->flip_mean);
-    json_number(json, "flip_max", display->flip_max);
-    json_end(json);
+    json_addf(json,
+              "image {rmse %g psnr %g rel_mse %g srgb_psnr %g off_by_1 %zu off_by_more %zu flip_mean %g "
+              "flip_max %g}",
+              errors->image.rmse, errors->image.psnr, errors->image.rel_mse, display->srgb_psnr,
+              display->off_by_1, display->off_by_more, display->flip_mean, display->flip_max);
     json_end(json);
 }
 
@@ -153,15 +121,12 @@ static void worst_json(Json *json, AccuracyMeasure measure, const AccuracyWorst 
         return;
     }
     json_begin_object(json, name);
-    json_int64(json, "x", worst->x);
-    json_int64(json, "y", worst->y);
+    json_addf(json, "x %u y %u", worst->x, worst->y);
     if (measure <= ACCURACY_PATH) json_bool(json, "away", worst->away);
-    if (measure == ACCURACY_SHADOW) json_int64(json, "light", worst->light);
+    if (measure == ACCURACY_SHADOW) json_count(json, "light", worst->light);
     json_number(json, "error", worst->error);
-    if (measure != ACCURACY_NORMAL) {
-        json_number(json, "reference", worst->reference);
-        json_number(json, "variant", worst->variant);
-    }
+    if (measure != ACCURACY_NORMAL)
+        json_addf(json, "reference %g variant %g", worst->reference, worst->variant);
     numbers_json(json, "reference_color", worst->reference_color, 3);
     numbers_json(json, "variant_color", worst->variant_color, 3);
     json_end(json);
@@ -192,15 +157,12 @@ static void variant_json(Json *json, const AccuracyReport *report, size_t scene,
 {
     const BenchKey *key = &variant->row->key;
     json_begin_object(json, NULL);
-    json_text(json, "precision", key->precision);
-    json_int64(json, "lanes", key->lanes);
-    json_text(json, "bvh", key->bvh);
-    json_int64(json, "samples", variant->samples);
-    json_text(json, "status", accuracy_status_names[variant->status]);
+    json_addf(json, "precision %s lanes %u bvh %s samples %u status %s", key->precision, key->lanes, key->bvh,
+              variant->samples, accuracy_status_names[variant->status]);
     if (variant->status == ACCURACY_UNAVAILABLE) json_text(json, "reason", variant->row->failure);
     if (variant->status == ACCURACY_REFERENCE) json_text(json, "reason", is_reference);
     if (variant->status != ACCURACY_UNAVAILABLE) {
-        hash_json(json, "kernel_hash", variant->row->kernel_hash);
+        json_addf(json, "kernel_hash %016" PRIx64, variant->row->kernel_hash);
         times_json(json, variant->row);
         rays_json(json, variant->row);
         saved_json(json, report, scene, variant);
@@ -213,28 +175,20 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
 {
     const AccuracyRecommendation *pick = &scene->recommendations[index];
     json_begin_object(json, NULL);
-    json_number(json, "budget", pick->budget);
-    json_text(json, "measure", accuracy_measure_names[pick->measure]);
+    json_addf(json, "budget %g measure %s", pick->budget, accuracy_measure_names[pick->measure]);
     if (pick->variant == SIZE_MAX) {
         json_none(json, "variant");
     } else {
         const AccuracyVariant *variant = &scene->variants[pick->variant];
-        Figure error = accuracy_figure(variant, pick->measure);
-        json_count(json, "variant", pick->variant);
-        if (error.why_not)
-            json_none(json, "error");
-        else
-            json_number(json, "error", error.value);
-        json_number(json, "frame_ms", accuracy_frame_ms(variant));
+        const Figure error = accuracy_figure(variant, pick->measure);
+        json_addf(json, "variant %zu error %g frame_ms %g", pick->variant, error.why_not ? NAN : error.value,
+                  accuracy_frame_ms(variant));
         json_begin_array(json, "others");
         for (size_t i = 0; i < scene->variant_count; i++) {
             const Comparison *time = &pick->times[i];
-            if (time->ratio == 0) continue;
-            json_begin_object(json, NULL);
-            json_count(json, "variant", i);
-            json_bool(json, "ties", accuracy_ties(pick, i));
-            ratio_json(json, time);
-            json_end(json);
+            if (time->ratio != 0)
+                json_addf(json, "{variant %zu ties %d ratio %g low %g high %g}", i, accuracy_ties(pick, i),
+                          time->ratio, time->low, time->high);
         }
         json_end(json);
     }
@@ -246,11 +200,9 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
 {
     const AccuracyScene *scene = &report->scenes[index];
     json_begin_object(json, NULL);
-    json_text(json, "scene", scene->path);
-    size_json(json, scene->width, scene->height);
-    json_count(json, "pixels", (uint64_t)scene->width * scene->height);
-    json_int64(json, "bounces", scene->bounce_count);
-    json_int64(json, "lights", scene->light_count);
+    json_addf(json, "scene %s size [%u %u] pixels %" PRIu64 " bounces %u lights %u", scene->path,
+              scene->width, scene->height, (uint64_t)scene->width * scene->height, scene->bounce_count,
+              scene->light_count);
     reference_json(json, report, index);
     json_begin_array(json, "variants");
     for (size_t i = 0; i < scene->variant_count; i++)

@@ -119,7 +119,7 @@ static void scene_json(Json *json, const AccuracyScene *scene)
 Json *accuracy_page_extras(const AccuracyReport *report)
 {
     Json *json = json_open();
-    json_int64(json, "difference_decades", DECADES);
+    json_count(json, "difference_decades", DECADES);
     json_begin_array(json, "difference_colors");
     Rgb8 colors[STEP_COUNT];
     step_colors(colors);

@@ -275,8 +275,7 @@ static int pairs_run(Against *against, Progress *progress)
 static Json *against_json(const Against *against, const Device *device)
 {
     Json *json = bench_json_open(device);
-    json_text(json, "against", against->options->other);
-    json_number(json, "confidence", comparison_confidence);
+    json_addf(json, "against %s confidence %g", against->options->other, comparison_confidence);
     json_begin_array(json, "runs");
     for (size_t i = 0; i < against->set->count; i++) {
         json_begin_object(json, NULL);

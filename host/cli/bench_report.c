@@ -220,35 +220,25 @@ Json *bench_json_open(const Device *device)
     Json *json = report_json_open(BENCH_SCHEMA, device);
     time_t now = time(NULL);
     struct tm utc;
+    struct utsname host = {0};
     char date[32] = "";
     if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
-    json_text(json, "date", date);
-    struct utsname host = {0};
     uname(&host);
-    json_begin_object(json, "host");
-    json_text(json, "name", host.nodename);
-    json_text(json, "system", host.sysname);
-    json_text(json, "release", host.release);
-    json_text(json, "machine", host.machine);
-    json_int64(json, "processors", sysconf(_SC_NPROCESSORS_ONLN));
-    json_end(json);
-    json_begin_object(json, "build");
-    json_text(json, "commit", glint_commit());
-    json_text(json, "compiler", glint_compiler());
-    json_end(json);
+    json_addf(
+        json,
+        "date %s host {name %s system %s release %s machine %s processors %zu} build {commit %s compiler %s}",
+        date, host.nodename, host.sysname, host.release, host.machine, (size_t)sysconf(_SC_NPROCESSORS_ONLN),
+        glint_commit(), glint_compiler());
     return json;
 }
 
 void key_json(Json *json, const BenchKey *key)
 {
-    json_text(json, "scene", key->scene);
-    hash_json(json, "scene_hash", key->scene_hash);
-    json_text(json, "precision", key->precision);
-    json_int64(json, "lanes", key->lanes);
-    json_text(json, "bvh", key->bvh);
-    size_json(json, key->width, key->height);
-    json_int64(json, "samples", key->samples);
-    json_int64(json, "bounces", key->bounces);
+    json_addf(json,
+              "scene %s scene_hash %016" PRIx64
+              " precision %s lanes %u bvh %s size [%u %u] samples %u bounces %u",
+              key->scene, key->scene_hash, key->precision, key->lanes, key->bvh, key->width, key->height,
+              key->samples, key->bounces);
     if (key->variant) json_text(json, "variant", key->variant);
 }
 
@@ -256,29 +246,28 @@ static void first_json(Json *json, const BenchReport *report, size_t i)
 {
     Comparison to_first;
     json_begin_object(json, "to_first");
-    if (first_compare(report, i, &to_first)) {
+    if (first_compare(report, i, &to_first))
         ratio_json(json, &to_first);
-    } else {
+    else
         unavailable_json(json, first_unavailable);
-    }
     json_end(json);
 }
 
 static void energy_json(Json *json, const BenchEnergy *energy)
 {
-    if (!energy->source) {
+    json_begin_object(json, "energy");
+    if (energy->source)
+        json_addf(json, "source %s frame_mj %g watts %g", energy->source, 1e3 * energy->joules,
+                  energy->joules / energy->seconds);
+    else
         unavailable_json(json, energy->why_not);
-        return;
-    }
-    json_text(json, "source", energy->source);
-    json_number(json, "frame_mj", 1e3 * energy->joules);
-    json_number(json, "watts", energy->joules / energy->seconds);
+    json_end(json);
 }
 
 static void results_json(Json *json, const BenchReport *report, size_t i)
 {
     const BenchRow *row = &report->set->rows[i];
-    hash_json(json, "kernel_hash", row->kernel_hash);
+    json_addf(json, "kernel_hash %016" PRIx64, row->kernel_hash);
     build_options_json(json, run_report(report, i));
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
@@ -290,9 +279,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     const Comparison drift = row_drift(report, row);
     verdict_json(json, &drift, drift.verdict);
     json_end(json);
-    json_begin_object(json, "energy");
     energy_json(json, &row->energy);
-    json_end(json);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);
     figure_json(json, "cached", 1e3, row->build_cached);
@@ -309,7 +296,7 @@ Json *bench_json(const BenchReport *report)
 {
     Json *json = bench_json_open(report->device);
     json_begin_object(json, "calibration");
-    json_int64(json, "rounds", CALIBRATION_ROUNDS);
+    json_count(json, "rounds", CALIBRATION_ROUNDS);
     samples_json(json, "samples_ms", &report->set->calibration.wall);
     samples_json(json, "processor_samples_ms", &report->set->calibration.processor);
     json_end(json);

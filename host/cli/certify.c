@@ -122,56 +122,38 @@ static void row_json(Json *json, Precision precision, const CertifyRow *row)
     if (!row->measured && !row->failure) return;
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
-    if (row->failure) {
+    if (row->failure)
         unavailable_json(json, row->failure);
-        json_end(json);
-        return;
-    }
-    json_count(json, "compared", errors->compared);
-    json_begin_object(json, "wrong");
-    json_count(json, "object", errors->object);
-    json_count(json, "shadow", errors->shadow);
-    json_count(json, "path", errors->path);
-    json_count(json, "color", errors->color);
-    json_number(json, "margin", errors->margin);
-    json_end(json);
-    json_begin_object(json, "color");
-    json_count(json, "pixels", errors->colors);
-    json_number(json, "bound", CERTIFIED_COLOR_ERROR);
-    json_number(json, "max_right", errors->right_color);
-    json_number(json, "max_wrong", errors->wrong_color);
-    json_int64(json, "x", errors->worst[0]);
-    json_int64(json, "y", errors->worst[1]);
-    json_end(json);
-    if (precision == PRECISION_CERTIFIED) {
-        json_count(json, "wrong_decided", errors->wrong_decided);
-        json_text(json, "claim", errors->wrong_decided > 0 ? "broken" : "kept");
-        json_count(json, "unconfirmed", errors->unconfirmed);
-        json_count(json, "contradicted", errors->contradicted);
-        json_begin_object(json, "uncertified");
-        json_count(json, "pixels", uncertified->count);
-        json_count(json, "examined", uncertified->examined);
-        json_count(json, "witnessed", uncertified->witnessed);
-        json_count(json, "close", uncertified->close);
-        json_end(json);
-    }
+    else
+        json_addf(json,
+                  "compared %zu wrong {object %zu shadow %zu path %zu color %zu margin %g} "
+                  "color {pixels %zu bound %g max_right %g max_wrong %g x %u y %u}",
+                  errors->compared, errors->object, errors->shadow, errors->path, errors->color,
+                  errors->margin, errors->colors, CERTIFIED_COLOR_ERROR, errors->right_color,
+                  errors->wrong_color, errors->worst[0], errors->worst[1]);
+    if (!row->failure && precision == PRECISION_CERTIFIED)
+        json_addf(json,
+                  "wrong_decided %zu claim %s unconfirmed %zu contradicted %zu "
+                  "uncertified {pixels %zu examined %zu witnessed %zu close %zu}",
+                  errors->wrong_decided, errors->wrong_decided > 0 ? "broken" : "kept", errors->unconfirmed,
+                  errors->contradicted, uncertified->count, uncertified->examined, uncertified->witnessed,
+                  uncertified->close);
     json_end(json);
 }
 
 static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
+    const CommonOptions *common = &certification->options->common;
     Json *json = report_json_open(2, certification->compute->device);
-    perturb_json(json, certification->options->common.perturb_seed,
-                 certification->options->common.perturb_scale);
-    json_text(json, "scene", certification->options->scene);
-    size_json(json, sample->width, sample->height);
-    json_int64(json, "bounces", certification->options->common.bounce_count);
-    json_number(json, "min_contribution", certification->options->common.min_contribution);
-    json_count(json, "pixels", sample->count);
-    json_int64(json, "reference_bits", QUAD_BITS);
-    json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
-    json_count(json, "reference_uncertain", certification->uncertain_count);
+    perturb_json(json, common->perturb_seed, common->perturb_scale);
+    json_addf(
+        json,
+        "scene %s size [%u %u] bounces %u min_contribution %g pixels %zu reference_bits %u reference_ms %g "
+        "reference_uncertain %zu",
+        certification->options->scene, sample->width, sample->height, common->bounce_count,
+        common->min_contribution, sample->count, (unsigned)QUAD_BITS, 1e3 * certification->reference_seconds,
+        certification->uncertain_count);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
         row_json(json, (Precision)i, &certification->rows[i]);

@@ -110,62 +110,48 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
     printf("\n");
 }
 
-static void vector_json(Json *json, const char *key, Vector3 v)
+static void messages_json(Json *json, const char *key, MessageSeverity severity, const MessageList *messages)
 {
-    numbers_json(json, key, (const double[]){v.x, v.y, v.z}, 3);
+    json_begin_array(json, key);
+    for (size_t i = 0; i < messages->count; i++) {
+        const Message *message = &messages->items[i];
+        if (message->severity == severity)
+            json_addf(json, "{file %s line %u column %u text %s}", message->file, message->line,
+                      message->column, message->text);
+    }
+    json_end(json);
 }
 
-static void messages_json(Json *json, const MessageList *messages)
+static void facts_json(Json *json, const Scene *scene)
 {
-    static const char *const keys[] = {[MESSAGE_WARNING] = "warnings", [MESSAGE_ERROR] = "errors"};
-    for (MessageSeverity severity = MESSAGE_WARNING; severity <= MESSAGE_ERROR; severity++) {
-        json_begin_array(json, keys[severity]);
-        for (size_t i = 0; i < messages->count; i++) {
-            const Message *message = &messages->items[i];
-            if (message->severity != severity) continue;
-            json_begin_object(json, NULL);
-            json_text(json, "file", message->file);
-            json_int64(json, "line", message->line);
-            json_int64(json, "column", message->column);
-            json_text(json, "text", message->text);
-            json_end(json);
-        }
-        json_end(json);
-    }
+    const SceneFacts facts = facts_of(scene);
+    const Vector3 low = facts.bounds.min, high = facts.bounds.max;
+    json_count(json, "objects", scene->objects.count);
+    json_begin_object(json, "shapes");
+    for (size_t type = 0; type < SHAPE_COUNT; type++)
+        if (type != SHAPE_OVAL) json_count(json, shape_names[type], facts.shapes[type]);
+    json_end(json);
+    json_addf(json, "mesh_triangles %zu unbounded %zu lights %zu materials %zu frames %u fps %g",
+              facts.mesh_triangle_count, facts.unbounded_count, scene->lights.count, scene->materials.count,
+              scene->animation.frame_count, scene->animation.frame_rate);
+    if (bounds_is_empty(&facts.bounds))
+        json_none(json, "bounds");
+    else
+        json_addf(json, "bounds {min [%g %g %g] max [%g %g %g]}", low.x, low.y, low.z, high.x, high.y,
+                  high.z);
+    json_begin_array(json, "features");
+    for (unsigned i = 0; i < FEATURE_COUNT; i++)
+        if (facts.features >> i & 1) json_text(json, NULL, feature_names[i]);
+    json_end(json);
 }
 
 static void json_report(const char *path, const Scene *scene, bool loaded, const MessageList *messages)
 {
     Json *json = report_json_open(1, NULL);
-    json_text(json, "scene", path);
-    json_bool(json, "valid", loaded);
-    if (loaded) {
-        SceneFacts facts = facts_of(scene);
-        json_count(json, "objects", scene->objects.count);
-        json_begin_object(json, "shapes");
-        for (size_t type = 0; type < SHAPE_COUNT; type++)
-            if (type != SHAPE_OVAL) json_count(json, shape_names[type], facts.shapes[type]);
-        json_end(json);
-        json_count(json, "mesh_triangles", facts.mesh_triangle_count);
-        json_count(json, "unbounded", facts.unbounded_count);
-        json_count(json, "lights", scene->lights.count);
-        json_count(json, "materials", scene->materials.count);
-        json_int64(json, "frames", scene->animation.frame_count);
-        json_number(json, "fps", scene->animation.frame_rate);
-        if (bounds_is_empty(&facts.bounds)) {
-            json_none(json, "bounds");
-        } else {
-            json_begin_object(json, "bounds");
-            vector_json(json, "min", facts.bounds.min);
-            vector_json(json, "max", facts.bounds.max);
-            json_end(json);
-        }
-        json_begin_array(json, "features");
-        for (unsigned i = 0; i < FEATURE_COUNT; i++)
-            if (facts.features >> i & 1) json_text(json, NULL, feature_names[i]);
-        json_end(json);
-    }
-    messages_json(json, messages);
+    json_addf(json, "scene %s valid %d", path, loaded);
+    if (loaded) facts_json(json, scene);
+    messages_json(json, "warnings", MESSAGE_WARNING, messages);
+    messages_json(json, "errors", MESSAGE_ERROR, messages);
     json_print(json, stdout);
 }
 

@@ -9,6 +9,7 @@
 #include "host/cli/report_json.h"
 #include "host/cli/table.h"
 #include "host/opencl/device.h"
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -27,50 +28,45 @@ static const CommandLine command_line = {
              "what the arithmetic of each device really does, if that was measured.\n",
     .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(keep_kernels_option)}};
 
+static void device_json(Json *json, const Device *device, bool is_default)
+{
+    const char *why;
+    const bool is_usable = device_usable(device, &why);
+    json_begin_object(json, NULL);
+    json_addf(json, "index %u twin %u default %d usable %d", device->index, device->same_name_index,
+              is_default, is_usable);
+    json_text(json, "unusable_because", why);
+    json_text(json, "name", device->name);
+    device_identity_json(json, device);
+    json_addf(json,
+              "type %s profile %s vendor %s platform %s platform_version %s version %s driver %s "
+              "units %u clock_mhz %u lanes %u native_float_width %u native_double_width %u",
+              device_type_name(device->type), device->embedded_profile ? "embedded" : "full", device->vendor,
+              device->platform_name, device->platform_version, device->version, device->driver,
+              device->compute_units, device->clock_mhz, device_lanes(device, false, 0),
+              device->native_float_width, device->native_double_width);
+    json_addf(json,
+              "fp64 %d denormals %d fma %d correctly_rounded_divide_sqrt %d compiler %d address_bits %u",
+              device->fp64, device->denormals, device->fma_in_hardware, device->correctly_rounded,
+              device->compiler, device->address_bits);
+    json_addf(json,
+              "memory_bytes %" PRIu64 " largest_buffer_bytes %" PRIu64 " local_memory_bytes %" PRIu64
+              " largest_work_group %zu timer_resolution_seconds %g",
+              device->memory_bytes, device->largest_buffer_bytes, device->local_memory_bytes,
+              device->largest_work_group, device->timer_resolution_seconds);
+    passports_json(json, device);
+    passports_refusals_json(json, device);
+    json_end(json);
+}
+
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
     Json *json = report_json_open(1, NULL);
-    json_int64(json, "platforms", list->platform_count);
-    json_int64(json, "platforms_without_device", list->empty_platform_count);
+    json_addf(json, "platforms %u platforms_without_device %u", list->platform_count,
+              list->empty_platform_count);
     json_begin_array(json, "devices");
-    for (size_t i = 0; i < list->count; i++) {
-        const Device *device = &list->items[i];
-        const char *why;
-        json_begin_object(json, NULL);
-        json_int64(json, "index", device->index);
-        json_int64(json, "twin", device->same_name_index);
-        json_bool(json, "default", device == chosen);
-        json_bool(json, "usable", device_usable(device, &why));
-        json_text(json, "unusable_because", why);
-        json_text(json, "name", device->name);
-        device_identity_json(json, device);
-        json_text(json, "type", device_type_name(device->type));
-        json_text(json, "profile", device->embedded_profile ? "embedded" : "full");
-        json_text(json, "vendor", device->vendor);
-        json_text(json, "platform", device->platform_name);
-        json_text(json, "platform_version", device->platform_version);
-        json_text(json, "version", device->version);
-        json_text(json, "driver", device->driver);
-        json_int64(json, "units", device->compute_units);
-        json_int64(json, "clock_mhz", device->clock_mhz);
-        json_int64(json, "lanes", device_lanes(device, false, 0));
-        json_int64(json, "native_float_width", device->native_float_width);
-        json_int64(json, "native_double_width", device->native_double_width);
-        json_bool(json, "fp64", device->fp64);
-        json_bool(json, "denormals", device->denormals);
-        json_bool(json, "fma", device->fma_in_hardware);
-        json_bool(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
-        json_bool(json, "compiler", device->compiler);
-        json_int64(json, "address_bits", device->address_bits);
-        json_count(json, "memory_bytes", device->memory_bytes);
-        json_count(json, "largest_buffer_bytes", device->largest_buffer_bytes);
-        json_count(json, "local_memory_bytes", device->local_memory_bytes);
-        json_count(json, "largest_work_group", device->largest_work_group);
-        json_number(json, "timer_resolution_seconds", device->timer_resolution_seconds);
-        passports_json(json, device);
-        passports_refusals_json(json, device);
-        json_end(json);
-    }
+    for (size_t i = 0; i < list->count; i++)
+        device_json(json, &list->items[i], &list->items[i] == chosen);
     json_print(json, stdout);
 }
 

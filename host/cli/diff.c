@@ -134,9 +134,8 @@ static void limits_json(Json *json, const DiffOptions *options, const ComparedIm
     for (size_t i = 0; i < LIMIT_COUNT; i++) {
         if (!comparison->limits[i].is_given) continue;
         json_begin_object(json, limit_types[i].name);
-        json_number(json, "limit", options->limits[i]);
-        json_number(json, "value", comparison->limits[i].value);
-        json_bool(json, "met", comparison->limits[i].is_met);
+        json_addf(json, "limit %g value %g met %d", options->limits[i], comparison->limits[i].value,
+                  comparison->limits[i].is_met);
         json_end(json);
     }
     json_end(json);
@@ -161,79 +160,45 @@ static const char *kind_word(const Image *image)
     return image->data ? "data" : image->display ? "display" : "linear";
 }
 
-static void light_json(Json *json, const ErrorSummary *linear)
+// Adds the values of the worst pixel.
+static void worst_json(Json *json, const char *key, const ComparedImages *comparison, const Image *image)
 {
-    json_begin_object(json, "linear");
-    json_count(json, "values", linear->count);
-    json_number(json, "max_abs", linear->largest);
-    json_number(json, "rmse", linear->rmse);
-    json_number(json, "bias", linear->bias);
-    json_number(json, "p99_9", linear->percentile_999);
-    json_number(json, "psnr", linear->psnr);
-    json_number(json, "rel_mse", linear->rel_mse);
-    json_end(json);
-}
-
-static void color_json(Json *json, const ImageMetrics *metrics)
-{
-    json_begin_object(json, "srgb8");
-    json_number(json, "psnr", metrics->srgb_psnr);
-    json_count(json, "off_by_1", metrics->off_by_1);
-    json_count(json, "off_by_2_or_more", metrics->off_by_more);
-    json_end(json);
-    json_begin_object(json, "flip");
-    json_number(json, "mean", metrics->flip_mean);
-    json_number(json, "max", metrics->flip_max);
-    json_int64(json, "pixels_per_degree", FLIP_PIXELS_PER_DEGREE);
-    json_end(json);
-}
-
-static void worst_json(Json *json, const ComparedImages *comparison)
-{
-    const struct {
-        const char *key;
-        const Image *image;
-    } images[] = {{"reference", &comparison->reference}, {"image", &comparison->test}};
-    json_begin_object(json, "worst");
-    json_int64(json, "x", comparison->metrics.worst_x);
-    json_int64(json, "y", comparison->metrics.worst_y);
-    for (size_t i = 0; i < COUNT_OF(images); i++) {
-        json_begin_array(json, images[i].key);
-        for (uint32_t channel = 0; channel < images[i].image->channels; channel++)
-            json_number(json, NULL, worst_value(comparison, images[i].image, channel));
-        json_end(json);
-    }
+    json_begin_array(json, key);
+    for (uint32_t channel = 0; channel < image->channels; channel++)
+        json_number(json, NULL, worst_value(comparison, image, channel));
     json_end(json);
 }
 
 static Json *diff_json(const DiffOptions *options, const ComparedImages *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
+    const ErrorSummary *linear = &metrics->linear;
     const Image *reference = &comparison->reference;
     Json *json = report_json_open(2, NULL);
-    json_text(json, "reference", options->reference_path);
-    json_text(json, "image", options->test_path);
-    size_json(json, reference->width, reference->height);
-    json_int64(json, "channels", reference->channels);
-    json_text(json, "kind", kind_word(reference));
-    json_bool(json, "equal", metrics->differing_count == 0);
-    json_count(json, "differing_values", metrics->differing_count);
-    json_begin_object(json, "nonfinite_pixels");
-    json_count(json, "reference", metrics->nonfinite_reference);
-    json_count(json, "image", metrics->nonfinite_test);
-    json_end(json);
-    json_count(json, "unmatched_values", metrics->unmatched_count);
-    light_json(json, &metrics->linear);
+    json_addf(json, "reference %s image %s size [%u %u] channels %u kind %s equal %d differing_values %zu",
+              options->reference_path, options->test_path, reference->width, reference->height,
+              reference->channels, kind_word(reference), metrics->differing_count == 0,
+              metrics->differing_count);
+    json_addf(json, "nonfinite_pixels {reference %zu image %zu} unmatched_values %zu",
+              metrics->nonfinite_reference, metrics->nonfinite_test, metrics->unmatched_count);
+    json_addf(json, "linear {values %zu max_abs %g rmse %g bias %g p99_9 %g psnr %g rel_mse %g}",
+              linear->count, linear->largest, linear->rmse, linear->bias, linear->percentile_999,
+              linear->psnr, linear->rel_mse);
     if (metrics->has_ulp) json_number(json, "max_ulp", metrics->largest_ulp);
-    if (metrics->has_color) color_json(json, metrics);
-    worst_json(json, comparison);
-    if (options->heatmap_path) {
-        json_begin_object(json, "heatmap");
-        json_text(json, "file", options->heatmap_path);
-        json_number(json, "white", metrics->linear.largest);
-        json_number(json, "black", metrics->linear.largest * pow(10, -HEATMAP_DECADES));
-        json_end(json);
-    }
+    if (metrics->has_color)
+        json_addf(
+            json,
+            "srgb8 {psnr %g off_by_1 %zu off_by_2_or_more %zu} flip {mean %g max %g pixels_per_degree %u}",
+            metrics->srgb_psnr, metrics->off_by_1, metrics->off_by_more, metrics->flip_mean,
+            metrics->flip_max, (unsigned)FLIP_PIXELS_PER_DEGREE);
+    json_begin_object(json, "worst");
+    json_addf(json, "x %u y %u", metrics->worst_x, metrics->worst_y);
+    worst_json(json, "reference", comparison, reference);
+    worst_json(json, "image", comparison, &comparison->test);
+    json_end(json);
+    if (options->heatmap_path)
+        json_addf(json, "heatmap {file %s white %g black %g}", options->heatmap_path, linear->largest,
+                  linear->largest * pow(10, -HEATMAP_DECADES));
     limits_json(json, options, comparison);
     return json;
 }

@@ -218,21 +218,16 @@ static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t
         const GoldenCheck *check = &checks[i];
         const bool same = check->first == HASHED_COUNT;
         json_begin_object(json, NULL);
-        json_text(json, "scene", check->scene);
-        json_bool(json, "same", same);
-        json_text(json, "verdict",
+        json_addf(json, "scene %s same %d verdict %s", check->scene, same,
                   check->is_new          ? "no line"
                   : same                 ? "same"
                   : check->scene_differs ? "another scene"
                                          : "different");
         json_text(json, "first", same || check->is_new ? NULL : layer_names[hashed_layers[check->first]]);
         json_count(json, "tiles", check->tile_count);
-        if (check->tile_count > 0) {
-            json_int64(json, "left", check->box.left);
-            json_int64(json, "top", check->box.top);
-            json_int64(json, "right", check->box.right);
-            json_int64(json, "bottom", check->box.bottom);
-        }
+        if (check->tile_count > 0)
+            json_addf(json, "left %u top %u right %u bottom %u", check->box.left, check->box.top,
+                      check->box.right, check->box.bottom);
         json_text(json, "crop", check->crop);
         json_end(json);
     }

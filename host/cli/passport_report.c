@@ -5,27 +5,15 @@
 #include <math.h>
 #include <string.h>
 
-static void rounded_results_json(Json *json, const char *key, const RoundedResults *results)
-{
-    json_begin_object(json, key);
-    json_number(json, "largest_ulp", results->largest_ulp);
-    json_count(json, "count", results->count);
-    json_count(json, "wrong", results->wrong_count);
-    json_bool(json, "exhaustive", results->is_exhaustive);
-    json_end(json);
-}
-
 static void properties_json(Json *json, const Passport *passport)
 {
     json_begin_array(json, "properties");
     for (Property property = 0; property < PROPERTY_COUNT; property++) {
         Text what = {0};
         const Finding finding = passport_finding(passport, property, &what);
-        json_begin_object(json, NULL);
-        json_text(json, "name", property_names[property]);
-        json_text(json, "finding", finding_names[finding]);
-        text_json(json, "value", what);
-        json_end(json);
+        json_addf(json, "{name %s finding %s value %s}", property_names[property], finding_names[finding],
+                  text_c(&what));
+        text_free(&what);
     }
     json_end(json);
 }
@@ -35,16 +23,16 @@ void passports_json(Json *json, const Device *device)
     json_begin_array(json, "passports");
     for (size_t i = 0; i < passport_count(device); i++) {
         const Passport *passport = passport_at(device, i);
+        const RoundedResults *quotients = &passport->quotients, *roots = &passport->roots;
         json_begin_object(json, NULL);
-        json_text(json, "precision", passport_mode_names[passport->mode]);
-        json_int64(json, "lanes", passport->lanes);
-        json_bool(json, "thorough", passport->is_thorough);
-        json_bool(json, "uses_fma", passport->uses_fma);
-        json_number(json, "fma_cost", passport->fma_is_fused ? passport->fma_cost : NAN);
-        rounded_results_json(json, "division", &passport->quotients);
-        rounded_results_json(json, "square_root", &passport->roots);
-        json_number(json, "build_ms", 1e3 * passport->build_seconds);
-        json_number(json, "probe_ms", 1e3 * passport->seconds);
+        json_addf(json, "precision %s lanes %u thorough %d uses_fma %d fma_cost %g",
+                  passport_mode_names[passport->mode], passport->lanes, passport->is_thorough,
+                  passport->uses_fma, passport->fma_is_fused ? passport->fma_cost : NAN);
+        json_addf(json, "division {largest_ulp %g count %zu wrong %zu exhaustive %d}", quotients->largest_ulp,
+                  quotients->count, quotients->wrong_count, quotients->is_exhaustive);
+        json_addf(json, "square_root {largest_ulp %g count %zu wrong %zu exhaustive %d}", roots->largest_ulp,
+                  roots->count, roots->wrong_count, roots->is_exhaustive);
+        json_addf(json, "build_ms %g probe_ms %g", 1e3 * passport->build_seconds, 1e3 * passport->seconds);
         properties_json(json, passport);
         json_end(json);
     }
@@ -56,12 +44,8 @@ void passports_refusals_json(Json *json, const Device *device)
     json_begin_array(json, "refused");
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
         Text why = {0};
-        if (arithmetic_refuses(device, precision, &why)) {
-            json_begin_object(json, NULL);
-            json_text(json, "precision", precision_names[precision]);
-            json_text(json, "reason", text_c(&why));
-            json_end(json);
-        }
+        if (arithmetic_refuses(device, precision, &why))
+            json_addf(json, "{precision %s reason %s}", precision_names[precision], text_c(&why));
         text_free(&why);
     }
     json_end(json);

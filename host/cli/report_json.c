@@ -16,18 +16,15 @@ void text_json(Json *json, const char *key, Text text)
 void summary_json(Json *json, const char *key, Summary seconds)
 {
     json_begin_object(json, key);
-    json_number(json, "min", 1e3 * seconds.min);
-    json_number(json, "median", 1e3 * seconds.median);
-    json_number(json, "max", 1e3 * seconds.max);
-    json_number(json, "quartile_range", 1e3 * (seconds.upper_quartile - seconds.lower_quartile));
-    json_count(json, "runs", seconds.count);
+    json_addf(json, "min %g median %g max %g quartile_range %g runs %zu", 1e3 * seconds.min,
+              1e3 * seconds.median, 1e3 * seconds.max,
+              1e3 * (seconds.upper_quartile - seconds.lower_quartile), seconds.count);
     json_end(json);
 }
 
 void unavailable_json(Json *json, const char *reason)
 {
-    json_text(json, "status", "unavailable");
-    json_text(json, "reason", reason);
+    json_addf(json, "status %s reason %s", "unavailable", reason);
 }
 
 void missing_json(Json *json, const char *key, const char *reason)
@@ -39,11 +36,10 @@ void missing_json(Json *json, const char *key, const char *reason)
 
 void figure_json(Json *json, const char *key, double scale, Figure figure)
 {
-    if (!figure.why_not) {
+    if (figure.why_not)
+        missing_json(json, key, figure.why_not);
+    else
         json_number(json, key, scale * figure.value);
-        return;
-    }
-    missing_json(json, key, figure.why_not);
 }
 
 static const char *null_if_empty(const char *text)
@@ -87,9 +83,7 @@ void numbers_json(Json *json, const char *key, const double *numbers, size_t cou
 
 void ratio_json(Json *json, const Comparison *comparison)
 {
-    json_number(json, "ratio", comparison->ratio);
-    json_number(json, "low", comparison->low);
-    json_number(json, "high", comparison->high);
+    json_addf(json, "ratio %g low %g high %g", comparison->ratio, comparison->low, comparison->high);
 }
 
 void command_json(Json *json, const RenderReport *report, const LaunchTime *time)
@@ -132,47 +126,24 @@ static void device_json(Json *json, const Device *device)
     json_begin_object(json, "device");
     json_text(json, "name", device->name);
     device_identity_json(json, device);
-    json_text(json, "platform", device->platform_name);
-    json_text(json, "platform_version", device->platform_version);
-    json_text(json, "driver", device->driver);
-    json_text(json, "type", device_type_name(device->type));
-    json_int64(json, "units", device->compute_units);
-    json_int64(json, "clock_mhz", device->clock_mhz);
+    json_addf(json, "platform %s platform_version %s driver %s type %s units %u clock_mhz %u",
+              device->platform_name, device->platform_version, device->driver, device_type_name(device->type),
+              device->compute_units, device->clock_mhz);
     passports_json(json, device);
     json_end(json);
 }
 
-Json *report_json_open(int schema, const Device *device)
+Json *report_json_open(unsigned schema, const Device *device)
 {
     Json *json = json_open();
-    json_int64(json, "schema", schema);
-    json_text(json, "glint", glint_version());
+    json_addf(json, "schema %u glint %s", schema, glint_version());
     if (device) device_json(json, device);
     return json;
 }
 
-void size_json(Json *json, uint32_t width, uint32_t height)
-{
-    json_begin_array(json, "size");
-    json_int64(json, NULL, width);
-    json_int64(json, NULL, height);
-    json_end(json);
-}
-
-void hash_json(Json *json, const char *key, uint64_t hash)
-{
-    char digits[17];
-    snprintf(digits, sizeof digits, "%016" PRIx64, hash);
-    json_text(json, key, digits);
-}
-
 void perturb_json(Json *json, uint32_t seed, uint32_t scale)
 {
-    if (seed == 0) return;
-    json_begin_object(json, "perturb");
-    json_int64(json, "seed", seed);
-    json_int64(json, "scale", scale);
-    json_end(json);
+    if (seed > 0) json_addf(json, "perturb {seed %u scale %u}", seed, scale);
 }
 
 void times_json(Json *json, const BenchRow *row)

@@ -8,7 +8,7 @@
 
 // Opens a report. Its first members are the versions of its schema and of glint and, unless `device` is NULL,
 // the device.
-Json *report_json_open(int schema, const Device *device);
+Json *report_json_open(unsigned schema, const Device *device);
 void text_json(Json *json, const char *key, Text text);          // frees the text
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
 // Adds the reason for a missing figure to the open object.
@@ -20,9 +20,7 @@ void figure_json(Json *json, const char *key, double scale, Figure figure);
 void device_identity_json(Json *json, const Device *device);
 void counts_json(Json *json, const char *key, const size_t *counts, size_t count);
 void numbers_json(Json *json, const char *key, const double *numbers, size_t count);
-void ratio_json(Json *json, const Comparison *comparison); // adds ratio, low and high
-void size_json(Json *json, uint32_t width, uint32_t height);
-void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
+void ratio_json(Json *json, const Comparison *comparison);    // adds ratio, low and high
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0
 // Adds all options that the kernels of a report were compiled with.
 void build_options_json(Json *json, const RenderReport *report);

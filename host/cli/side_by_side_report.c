@@ -143,17 +143,12 @@ static void report_json(Json *json, const SideReport *report)
 {
     const Baseline *baseline = report->baseline;
     json_begin_object(json, NULL);
-    json_text(json, "file", report->path);
-    json_text(json, "date", baseline->date);
-    json_text(json, "glint", baseline->version);
-    json_text(json, "commit", baseline->commit);
-    json_text(json, "device", baseline->device);
-    json_text(json, "board", baseline->board);
-    json_text(json, "platform", baseline->platform);
-    json_text(json, "driver", baseline->driver);
-    json_text(json, "host", baseline->host);
-    json_count(json, "rows", baseline->count);
-    json_count(json, "common", report->ratio_count);
+    json_addf(json,
+              "file %s date %s glint %s commit %s device %s board %s platform %s driver %s host %s rows %zu "
+              "common %zu",
+              report->path, baseline->date, baseline->version, baseline->commit, baseline->device,
+              baseline->board, baseline->platform, baseline->driver, baseline->host, baseline->count,
+              report->ratio_count);
     if (report->ratio_count > 0) json_number(json, "mean_ratio", report->mean_ratio);
     if (report->why_not) json_text(json, "why_not", report->why_not);
     for (size_t verdict = 0; verdict <= VERDICT_FASTER; verdict++)
@@ -165,13 +160,10 @@ static void times_summary_json(Json *json, const char *key, const Summary *secon
 {
     if (seconds->count == 0) return;
     json_begin_object(json, key);
-    json_number(json, "min", 1e3 * seconds->min);
-    json_number(json, "median", 1e3 * seconds->median);
-    json_number(json, "max", 1e3 * seconds->max);
-    if (seconds->lower_quartile > 0) {
-        json_number(json, "lower_quartile", 1e3 * seconds->lower_quartile);
-        json_number(json, "upper_quartile", 1e3 * seconds->upper_quartile);
-    }
+    json_addf(json, "min %g median %g max %g", 1e3 * seconds->min, 1e3 * seconds->median, 1e3 * seconds->max);
+    if (seconds->lower_quartile > 0)
+        json_addf(json, "lower_quartile %g upper_quartile %g", 1e3 * seconds->lower_quartile,
+                  1e3 * seconds->upper_quartile);
     json_count(json, "runs", seconds->count);
     json_end(json);
 }
@@ -184,7 +176,7 @@ static void cell_json(Json *json, const SideCell *cell)
     }
     const RowComparison *comparison = &cell->comparison;
     json_begin_object(json, NULL);
-    json_int64(json, "lanes", cell->row->key.lanes);
+    json_count(json, "lanes", cell->row->key.lanes);
     if (cell->row->failure[0] != '\0') json_text(json, "failure", cell->row->failure);
     times_summary_json(json, "frame_ms", &cell->row->frame);
     times_summary_json(json, "kernel_ms", &cell->row->kernel);
@@ -192,11 +184,9 @@ static void cell_json(Json *json, const SideCell *cell)
     if (cell->ratio > 0) json_number(json, "ratio", cell->ratio);
     if (cell->kernel_ratio > 0) json_number(json, "kernel_ratio", cell->kernel_ratio);
     if (cell->ratio > 0 && comparison->why_not) json_text(json, "why_not", comparison->why_not);
-    if (cell->ratio > 0 && !comparison->why_not) {
-        json_number(json, "low", comparison->frame.low);
-        json_number(json, "high", comparison->frame.high);
-        json_text(json, "verdict", verdict_names[comparison->verdict]);
-    }
+    if (cell->ratio > 0 && !comparison->why_not)
+        json_addf(json, "low %g high %g verdict %s", comparison->frame.low, comparison->frame.high,
+                  verdict_names[comparison->verdict]);
     json_end(json);
 }
 
@@ -219,8 +209,7 @@ static void row_json(Json *json, const SideBySide *side, size_t row)
 Json *side_by_side_json(const SideBySide *side)
 {
     Json *json = json_open();
-    json_number(json, "confidence", comparison_confidence);
-    json_number(json, "tolerance", baseline_tolerance);
+    json_addf(json, "confidence %g tolerance %g", comparison_confidence, baseline_tolerance);
     json_begin_array(json, "reports");
     for (size_t i = 0; i < side->report_count; i++)
         report_json(json, &side->reports[i]);

@@ -4,6 +4,7 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/timing_trace.h"
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -156,13 +157,9 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
     for (size_t i = 0; i < count; i++) {
         const LaunchTime *time = &launches[i].time;
         json_begin_object(json, NULL);
-        json_text(json, "name", launches[i].name);
-        json_text(json, "clock", time->trusted ? "event" : "host");
-        if (time->trusted)
-            json_number(json, "event_ms", 1e3 * time->event_seconds);
-        else
-            json_none(json, "event_ms");
-        json_number(json, "host_ms", 1e3 * time->host_seconds);
+        json_addf(json, "name %s clock %s event_ms %g host_ms %g", launches[i].name,
+                  time->trusted ? "event" : "host", time->trusted ? 1e3 * time->event_seconds : NAN,
+                  1e3 * time->host_seconds);
         command_json(json, report, time);
         if (time->fault) json_text(json, "doubt", time->fault);
         json_end(json);
@@ -172,21 +169,18 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
 
 static void share_json(Json *json, const WorkerShare *share, const RenderSettings *settings)
 {
-    json_number(json, "share", (double)share->rows / settings->region_height);
-    json_int64(json, "bands", share->bands);
-    json_number(json, "busy_ms", 1e3 * share->busy_seconds);
-    json_number(json, "idle_ms", 1e3 * share->idle_seconds);
+    json_addf(json, "share %g bands %u busy_ms %g idle_ms %g", (double)share->rows / settings->region_height,
+              share->bands, 1e3 * share->busy_seconds, 1e3 * share->idle_seconds);
 }
 
 static void ranks_json(Json *json, const Ranks *ranks, const RenderSettings *settings)
 {
     json_begin_array(json, "by_rank");
     for (size_t i = 0; i < ranks->remote.count; i++) {
+        const Rank *rank = &ranks->items[i];
         json_begin_object(json, NULL);
-        json_text(json, "host", ranks->items[i].host);
-        json_text(json, "name", ranks->items[i].device);
-        json_text(json, "driver", ranks->items[i].driver);
-        json_int64(json, "lanes", ranks->items[i].lanes[PASS_ALL]);
+        json_addf(json, "host %s name %s driver %s lanes %u", rank->host, rank->device, rank->driver,
+                  rank->lanes[PASS_ALL]);
         share_json(json, &ranks->remote.shares[i], settings);
         json_end(json);
     }
@@ -198,22 +192,16 @@ static void render_device_json(Json *json, const RenderReport *report, const Ren
     json_begin_object(json, NULL);
     json_text(json, "name", report->device->name);
     device_identity_json(json, report->device);
-    json_text(json, "platform", report->device->platform_name);
-    json_text(json, "driver", report->device->driver);
+    json_addf(json, "platform %s driver %s", report->device->platform_name, report->device->driver);
     passports_json(json, report->device);
     json_text(json, "double_by", report->reference_device ? report->reference_device->name : NULL);
-    json_int64(json, "lanes", report->lanes);
-    hash_json(json, "kernel_hash", report->kernel_hash);
+    json_addf(json, "lanes %u kernel_hash %016" PRIx64, report->lanes, report->kernel_hash);
     build_options_json(json, report);
-    json_number(json, "flatten_ms", 1e3 * report->flatten_seconds);
-    if (report->features & FEATURE_BVH)
-        json_number(json, "bvh_ms", 1e3 * report->bvh_seconds);
-    else
-        json_none(json, "bvh_ms");
-    json_number(json, "build_ms", 1e3 * report->build_seconds);
-    json_bool(json, "build_from_cache", report->build_from_cache);
-    json_bool(json, "build_out_of_line", report->is_out_of_line);
-    json_number(json, "upload_ms", 1e3 * report->upload_seconds);
+    json_addf(json,
+              "flatten_ms %g bvh_ms %g build_ms %g build_from_cache %d build_out_of_line %d upload_ms %g",
+              1e3 * report->flatten_seconds, report->features & FEATURE_BVH ? 1e3 * report->bvh_seconds : NAN,
+              1e3 * report->build_seconds, report->build_from_cache, report->is_out_of_line,
+              1e3 * report->upload_seconds);
     share_json(json, &report->share, settings);
     launches_json(json, "launches", report, report->launches.items, report->launches.count);
     launches_json(json, "read_backs", report, report->reads.items, report->reads.count);
@@ -225,27 +213,19 @@ static void candidate_json(Json *json, const Pilot *pilot, Precision precision)
     static const char *const statuses[] = {"untried", "measured", "unavailable"};
     const PilotCandidate *candidate = &pilot->candidates[precision];
     json_begin_object(json, NULL);
-    json_text(json, "precision", precision_names[precision]);
-    json_text(json, "status", statuses[candidate->status]);
-    if (candidate->status == PILOT_MEASURED) {
-        json_number(json, "error", candidate->verdict.error);
-        json_number(json, "bound", candidate->verdict.bound);
-        json_bool(json, "keeps", candidate->verdict.keeps);
-        json_number(json, "pixel_ns", 1e9 * candidate->pixel_seconds);
-    }
+    json_addf(json, "precision %s status %s", precision_names[precision], statuses[candidate->status]);
+    if (candidate->status == PILOT_MEASURED)
+        json_addf(json, "error %g bound %g keeps %d pixel_ns %g", candidate->verdict.error,
+                  candidate->verdict.bound, candidate->verdict.keeps, 1e9 * candidate->pixel_seconds);
     json_end(json);
 }
 
 static void pilot_json(Json *json, const Pilot *pilot)
 {
     json_begin_object(json, "pilot");
-    json_number(json, "limit", pilot->budget.limit);
-    json_text(json, "metric", error_metric_names[pilot->budget.metric]);
-    json_number(json, "confidence", pilot->confidence);
-    json_count(json, "pixels", pilot->pixels);
-    json_number(json, "color_max", pilot->color_max);
-    json_number(json, "total_ms", 1e3 * pilot->seconds);
-    json_number(json, "build_ms", 1e3 * pilot->build_seconds);
+    json_addf(json, "limit %g metric %s confidence %g pixels %zu color_max %g total_ms %g build_ms %g",
+              pilot->budget.limit, error_metric_names[pilot->budget.metric], pilot->confidence, pilot->pixels,
+              pilot->color_max, 1e3 * pilot->seconds, 1e3 * pilot->build_seconds);
     json_begin_array(json, "candidates");
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
         candidate_json(json, pilot, (Precision)i);
@@ -259,13 +239,11 @@ static void json_report(const ImageOrigin *origin, const HostTimes *host)
     Json *json = report_json_open(4, NULL);
     json_text(json, "scene", origin->scene_path);
     if (!isnan(host->frame)) json_number(json, "frame", host->frame);
-    size_json(json, settings->region_width, settings->region_height);
-    json_int64(json, "samples", settings->sample_count);
-    json_text(json, "precision", precision_names[settings->precision]);
-    if (settings->precision == PRECISION_CERTIFIED) {
-        json_count(json, "rerendered_samples", host->rerenders.rerendered);
-        json_count(json, "uncertified_samples", host->rerenders.uncertified);
-    }
+    json_addf(json, "size [%u %u] samples %u precision %s", settings->region_width, settings->region_height,
+              settings->sample_count, precision_names[settings->precision]);
+    if (settings->precision == PRECISION_CERTIFIED)
+        json_addf(json, "rerendered_samples %" PRIu64 " uncertified_samples %" PRIu64,
+                  host->rerenders.rerendered, host->rerenders.uncertified);
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);
     json_begin_array(json, "by_device");
@@ -273,8 +251,7 @@ static void json_report(const ImageOrigin *origin, const HostTimes *host)
         render_device_json(json, renderer_report(origin->renderers[i]), settings);
     json_end(json);
     if (origin->ranks) ranks_json(json, origin->ranks, settings);
-    json_number(json, "render_ms", 1e3 * host->render_seconds);
-    json_number(json, "encode_ms", 1e3 * host->encode_seconds);
+    json_addf(json, "render_ms %g encode_ms %g", 1e3 * host->render_seconds, 1e3 * host->encode_seconds);
     if (host->is_several)
         json_print_line(json, stdout);
     else

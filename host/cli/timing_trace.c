@@ -12,18 +12,13 @@ enum { PROCESS = 1, HOST_THREAD = PROCESS, THREADS_OF_DEVICE = 4 };
 static void event_begin(Json *json, const char *phase, const char *name, size_t thread)
 {
     json_begin_object(json, NULL);
-    json_text(json, "ph", phase);
-    json_text(json, "name", name);
-    json_int64(json, "pid", PROCESS);
-    json_count(json, "tid", thread);
+    json_addf(json, "ph %s name %s pid %u tid %zu", phase, name, (unsigned)PROCESS, thread);
 }
 
 static void thread_name(Json *json, size_t thread, const char *name)
 {
     event_begin(json, "M", "thread_name", thread);
-    json_begin_object(json, "args");
-    json_text(json, "name", name);
-    json_end(json);
+    json_addf(json, "args {name %s}", name);
     json_end(json);
 }
 
@@ -31,8 +26,7 @@ static void thread_name(Json *json, size_t thread, const char *name)
 static void span_begin(Json *json, const char *name, size_t thread, double start_seconds, double seconds)
 {
     event_begin(json, "X", name, thread);
-    json_number(json, "ts", 1e6 * start_seconds);
-    json_number(json, "dur", 1e6 * seconds);
+    json_addf(json, "ts %g dur %g", 1e6 * start_seconds, 1e6 * seconds);
 }
 
 static double host_end(const LaunchTime *time)
@@ -70,18 +64,17 @@ static void command_add(Json *json, const Commands *commands, const NamedLaunch 
                         double origin)
 {
     const LaunchTime *time = &command->time;
+    const double to_origin = commands->device_to_host - origin;
     const double start =
         time->trusted ? time->start_seconds + commands->device_to_host : time->host_start_seconds;
     span_begin(json, command->name, thread, start - origin,
                time->trusted ? time->event_seconds : time->host_seconds);
     json_begin_object(json, "args");
-    json_text(json, "clock", time->trusted ? "event" : "host");
-    json_number(json, "called_us", 1e6 * (time->host_start_seconds - origin));
-    if (time->trusted) {
-        const double to_origin = commands->device_to_host - origin;
-        json_number(json, "queued_us", 1e6 * (time->queued_seconds + to_origin));
-        json_number(json, "submitted_us", 1e6 * (time->submitted_seconds + to_origin));
-    }
+    json_addf(json, "clock %s called_us %g", time->trusted ? "event" : "host",
+              1e6 * (time->host_start_seconds - origin));
+    if (time->trusted)
+        json_addf(json, "queued_us %g submitted_us %g", 1e6 * (time->queued_seconds + to_origin),
+                  1e6 * (time->submitted_seconds + to_origin));
     if (time->dimensions > 0) counts_json(json, "work_items", time->global, time->dimensions);
     json_end(json);
     json_end(json);
@@ -127,12 +120,8 @@ void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *s
     for (size_t i = 0; i < count; i++)
         is_from_cache &= renderer_report(renderers[i])->build_from_cache;
     Json *json = json_open();
-    json_text(json, "displayTimeUnit", "ms");
-    json_begin_object(json, "otherData");
-    json_int64(json, "schema", 1);
-    json_text(json, "glint", glint_version());
-    json_bool(json, "kernels_from_cache", is_from_cache);
-    json_end(json);
+    json_addf(json, "displayTimeUnit %s otherData {schema %u glint %s kernels_from_cache %d}", "ms", 1U,
+              glint_version(), is_from_cache);
     json_begin_array(json, "traceEvents");
     thread_name(json, HOST_THREAD, "host");
     spans_add(json, "", spans, span_count, HOST_THREAD, origin);

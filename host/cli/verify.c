@@ -174,22 +174,20 @@ static void record_print(Verification *verification, CaseRecord *record)
 static void record_json(Json *json, const CaseRecord *record)
 {
     const VerifyResult *result = &record->result;
+    const bool has_bound = result->bound > 0;
     json_begin_object(json, NULL);
-    json_text(json, "name", result->name);
-    json_text(json, "title", result->title);
-    json_bool(json, "passed", !has_failed(record));
+    json_addf(json, "name %s title %s passed %d", result->name, result->title, !has_failed(record));
     if (record->state == CASE_CRASHED) {
         json_text(json, "crash", record->crash);
     } else {
         json_count(json, "rays", result->ray_count);
         for (size_t i = 0; i < COUNT_OF(faults); i++)
             json_count(json, faults[i].key, fault_count(result, i));
-        json_number(json, "surface_part", result->worst_position_ratio);
-        json_number(json, "normal_part", result->worst_normal_ratio);
-        json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
-        json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
-        if (result->bound > 0) json_text(json, "unit", result->unit);
-        hash_json(json, "hash", result->hash);
+        json_addf(json, "surface_part %g normal_part %g worst %g bound %g", result->worst_position_ratio,
+                  result->worst_normal_ratio, has_bound ? result->worst : NAN,
+                  has_bound ? result->bound : NAN);
+        if (has_bound) json_text(json, "unit", result->unit);
+        json_addf(json, "hash %016" PRIx64, result->hash);
     }
     json_number(json, "seconds", record->seconds);
     json_end(json);
@@ -275,20 +273,18 @@ static void precision_json(Json *json, const PrecisionRecord *record, Precision 
 {
     const RenderSettings settings = precision_settings(options, precision);
     const char tier[] = {(char)('A' + verify_tier(&settings)), '\0'};
+    const size_t failed = records_count(record, has_failed);
     json_begin_object(json, NULL);
-    json_text(json, "precision", precision_names[precision]);
-    json_text(json, "tier", tier);
+    json_addf(json, "precision %s tier %s", precision_names[precision], tier);
     json_begin_array(json, "cases");
     for (size_t i = 0; i < VERIFY_CASES_MAX; i++)
         if (has_ended(&record->cases[i])) record_json(json, &record->cases[i]);
     json_end(json);
-    const size_t failed = records_count(record, has_failed);
-    json_int64(json, "lanes", record->kernels.lanes);
-    hash_json(json, "trace_kernel", record->kernels.trace_hash);
-    hash_json(json, "render_kernel", record->kernels.render_hash);
-    json_count(json, "passed", records_count(record, has_ended) - failed);
-    json_count(json, "failed", failed);
-    json_number(json, "seconds", record->seconds);
+    json_addf(json,
+              "lanes %u trace_kernel %016" PRIx64 " render_kernel %016" PRIx64
+              " passed %zu failed %zu seconds %g",
+              record->kernels.lanes, record->kernels.trace_hash, record->kernels.render_hash,
+              records_count(record, has_ended) - failed, failed, record->seconds);
     json_end(json);
 }
 
@@ -296,8 +292,7 @@ static Json *journal_json(const Verification *verification)
 {
     const VerifyOptions *options = verification->options;
     Json *json = report_json_open(3, verification->compute->device);
-    json_int64(json, "reference_bits", verify_reference_bits());
-    json_bool(json, "quick", options->quick);
+    json_addf(json, "reference_bits %u quick %d", (unsigned)verify_reference_bits(), options->quick);
     perturb_json(json, options->common.perturb_seed, options->common.perturb_scale);
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
