@@ -306,8 +306,7 @@ static int accuracy_run(Accuracy *accuracy)
     const AccuracyReport *report = &accuracy->report;
     const ReportOptions *options = &accuracy->options.variants.common.report;
     if (report_has_text(options)) accuracy_print_text(report, stdout);
-    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(report), options)) return EXIT_USER;
-    if (!page_commit(accuracy)) return EXIT_USER;
+    if (!report_write(accuracy_json(report), options) || !page_commit(accuracy)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);
     return EXIT_USER;

@@ -296,10 +296,10 @@ int command_diff(int argument_count, char **arguments)
     bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);
     if (compared && report_has_text(&options.common.report)) text_print(&options, &comparison);
-    const bool is_written = !compared || options.common.report.format == FORMAT_TEXT ||
-                            report_write(diff_json(&options, &comparison), &options.common.report);
+    const bool is_written =
+        compared && report_write(diff_json(&options, &comparison), &options.common.report);
     image_free(&comparison.reference);
     image_free(&comparison.test);
-    if (!compared || !is_written) return EXIT_USER;
+    if (!is_written) return EXIT_USER;
     return comparison.passes ? EXIT_DONE : EXIT_CHECK;
 }
