@@ -25,25 +25,6 @@ typedef struct {
     VariantOptions variant_options[OPTION_TEXTS_MAX];
 } BenchOptions;
 
-static const Option command_options[] = {
-    {"against", "GLINT", "compare with another build, run alternately (default of --seconds: 30 per row)",
-     option_text, offsetof(BenchOptions, against)},
-    {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
-     offsetof(BenchOptions, baseline)},
-    {"tolerance", "R",
-     "ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 with --compare)",
-     option_number, offsetof(BenchOptions, tolerance), NUMBERS(1, INFINITY)},
-    {"worker", NULL, "answer another glint's --against", option_flag, offsetof(BenchOptions, is_worker)},
-    {"launches", NULL, "list the kernel launches of each row's last run", option_flag,
-     offsetof(BenchOptions, launches)},
-    {"no-build-times", NULL, "take kernels from the cache instead of timing their builds", option_flag,
-     offsetof(BenchOptions, variants.no_build_times)},
-    {"variant", "OPTIONS",
-     "add rows with these options, such as \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, "
-     "--bvh, "
-     "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
-     "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
-     option_texts, offsetof(BenchOptions, variant_texts)}};
 static const Option precisions_option[] = {PRECISIONS_OPTION("single")};
 
 typedef struct {
@@ -111,8 +92,10 @@ static bool variant_read(BenchOptions *options, size_t index)
 }
 
 // Reads the variants, which start from the options of all rows.
-static bool variants_read(BenchOptions *options)
+static bool effect_variants(const Option *option, void *bench_options)
 {
+    BenchOptions *options = bench_options;
+    (void)option;
     for (size_t i = 0; i < options->variant_texts.count; i++) {
         for (size_t k = 0; k < i; k++)
             if (strcmp(options->variant_texts.items[i], options->variant_texts.items[k]) == 0) {
@@ -124,14 +107,34 @@ static bool variants_read(BenchOptions *options)
     return true;
 }
 
+static const Option command_options[] = {
+    {"against", "GLINT", "compare with another build, run alternately (default of --seconds: 30 per row)",
+     option_text, offsetof(BenchOptions, against)},
+    {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
+     offsetof(BenchOptions, baseline)},
+    {"tolerance", "R",
+     "ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 with --compare)",
+     option_number, offsetof(BenchOptions, tolerance), NUMBERS(1, INFINITY)},
+    {"worker", NULL, "answer another glint's --against", option_flag, offsetof(BenchOptions, is_worker)},
+    {"launches", NULL, "list the kernel launches of each row's last run", option_flag,
+     offsetof(BenchOptions, launches)},
+    {"no-build-times", NULL, "take kernels from the cache instead of timing their builds", option_flag,
+     offsetof(BenchOptions, variants.no_build_times)},
+    {"variant", "OPTIONS",
+     "add rows with these options, such as \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, "
+     "--bvh, "
+     "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
+     "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
+     option_texts, offsetof(BenchOptions, variant_texts), .effect = effect_variants}};
+
 static const char *options_check(void *bench_options)
 {
-    BenchOptions *options = bench_options;
+    const BenchOptions *options = bench_options;
     if (options->against && options->baseline) return "--against cannot be combined with --compare";
     for (size_t i = 0; options->against && i < options->scenes.count; i++)
         if (strcmp(options->scenes.items[i], "-") == 0)
             return "--against reads each scene several times, so it cannot be '-'";
-    return variants_read(options) ? NULL : "";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -218,8 +221,7 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
     };
     const ReportOptions *format = &options->variants.common.report;
     if (report_has_text(format)) bench_print_text(&report, stdout);
-    const bool is_written = format->format == FORMAT_TEXT || report_write(bench_json(&report), format);
-    int status = is_written ? EXIT_DONE : EXIT_USER;
+    int status = report_write(bench_json(&report), format) ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;

@@ -300,7 +300,10 @@ static bool operands_read(const CommandLine *line, void *options, CommandOperand
         break;
     }
     *(CommandOperands *)field = operands;
-    return true;
+    bool are_right = true;
+    for (size_t i = 0; line->operand_check && i < count && are_right; i++)
+        are_right = line->operand_check(operands.items[i]);
+    return are_right;
 }
 
 bool option_usage_fault(const char *command, const char *what)
@@ -315,8 +318,7 @@ static bool checks_pass(const CommandLine *line, void *options)
     const char *what = line->check ? line->check(options) : NULL;
     for (const OptionGroup *group = line->groups; group->items && !what; group++)
         what = group->check ? group->check(options) : NULL;
-    if (what && *what) option_usage_fault(line->command, what);
-    return !what;
+    return !what || option_usage_fault(line->command, what);
 }
 
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments)

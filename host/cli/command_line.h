@@ -12,11 +12,11 @@ typedef struct Option Option;
 // option expects and returns false.
 typedef bool OptionReader(const Option *option, const char *value, void *options);
 // Carries out what a stored value asks for before the command starts, such as a new folder. Returns false
-// with a message if that fails.
+// with a message if that fails or the value does not suit the other options.
 typedef bool OptionEffect(const Option *option, void *options);
 
-// Checks options together. Returns the mistake, which the caller prints as a usage error, "" if it was
-// printed, or NULL if there is none.
+// Checks options together. Returns the mistake, which the caller prints as a usage error, or NULL if there is
+// none.
 typedef const char *OptionCheck(void *options);
 
 struct Option {
@@ -80,7 +80,9 @@ typedef struct {
     OptionGroup groups[OPTION_GROUPS_MAX + 1]; // up to the first without items
     OperandRule operands;
     size_t operands_offset; // of their field in the command's struct
-    OptionCheck *check;     // of all options and operands; may be NULL
+    // Prints a message and returns false if an operand is wrong; may be NULL.
+    bool (*operand_check)(const char *operand);
+    OptionCheck *check; // of all options and operands; may be NULL
 } CommandLine;
 
 // The result of reading a command line if the command must run. Any other result is the exit status.

@@ -54,19 +54,14 @@ static size_t case_index(const char *name)
     return i;
 }
 
-static const char *options_check(void *verify_options)
+static bool case_check(const char *name)
 {
-    const VerifyOptions *options = verify_options;
-    for (size_t i = 0; i < options->names.count; i++) {
-        const char *name = options->names.items[i];
-        if (verify_case_name(case_index(name))) continue;
-        fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
-        for (size_t k = 0; verify_case_name(k); k++)
-            fprintf(stderr, "%s%s", k ? ", " : "", verify_case_name(k));
-        fprintf(stderr, " (docs/verify.md)\n");
-        return "";
-    }
-    return NULL;
+    if (verify_case_name(case_index(name))) return true;
+    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
+    for (size_t i = 0; verify_case_name(i); i++)
+        fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
+    fprintf(stderr, " (docs/verify.md)\n");
+    return false;
 }
 
 static const CommandLine command_line = {
@@ -80,7 +75,7 @@ static const CommandLine command_line = {
                OPTIONS(driver_options), OPTIONS(keep_kernels_option), OPTIONS(perturb_option),
                REPORT_OPTIONS},
     OPERANDS(ANY, VerifyOptions, names),
-    .check = options_check};
+    .operand_check = case_check};
 
 typedef struct {
     const VerifyOptions *options;
@@ -347,9 +342,7 @@ static int device_verify(Verification *verification, Compute *compute)
     }
     progress_close(&verification->progress);
     if (verification->has_text) passports_remark(compute->device, stdout);
-    if (options->common.report.format != FORMAT_TEXT &&
-        !report_write(journal_json(verification), &options->common.report))
-        return EXIT_USER;
+    if (!report_write(journal_json(verification), &options->common.report)) return EXIT_USER;
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
 

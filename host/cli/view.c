@@ -18,13 +18,25 @@ typedef struct {
     bool writes_camera;
 } ViewOptions;
 
+static bool effect_camera_file(const Option *option, void *view_options)
+{
+    const ViewOptions *options = view_options;
+    const char *camera = options->common.camera ? options->common.camera : options->scene;
+    const bool is_stdin = strcmp(camera, "-") == 0;
+    if (is_stdin)
+        fprintf(stderr, "glint: --%s: standard input cannot be written; name a YAML file\n", option->name);
+    else if (!scene_is_yaml(camera))
+        fprintf(stderr, "glint: --%s: '%s' is not in YAML\n", option->name, camera);
+    return !is_stdin && scene_is_yaml(camera);
+}
+
 static const Option command_options[] = {
     {"size", "WxH", "width and height of the window in pixels (default: the scene's own, else 1280 wide)",
      option_size, offsetof(ViewOptions, common.size)},
     {"samples", "N", "samples per pixel once the camera rests (default: 16)", option_count,
      offsetof(ViewOptions, sample_count), NUMBERS(1, SAMPLES_MAX)},
     {"write-camera", NULL, "C and K write the camera into its file, which is YAML", option_flag,
-     offsetof(ViewOptions, writes_camera)}};
+     offsetof(ViewOptions, writes_camera), .effect = effect_camera_file}};
 
 static void keys_print(void)
 {
@@ -33,26 +45,12 @@ static void keys_print(void)
     putchar('\n');
 }
 
-static const char *options_check(void *view_options)
-{
-    const ViewOptions *options = view_options;
-    const char *camera = options->common.camera ? options->common.camera : options->scene;
-    const bool is_stdin = strcmp(camera, "-") == 0;
-    if (!options->writes_camera || (!is_stdin && scene_is_yaml(camera))) return NULL;
-    if (is_stdin)
-        fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
-    else
-        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", camera);
-    return "";
-}
-
 static const CommandLine command_line = {
     .command = "view",
     .usage = "usage: glint view SCENE [OPTIONS]\n",
     .usage_print = keys_print,
     .groups = {OPTIONS(command_options), OPTIONS(ray_options), OPTIONS(precision_option), SCENE_OPTIONS},
-    OPERANDS(SCENE, ViewOptions, scene),
-    .check = options_check};
+    OPERANDS(SCENE, ViewOptions, scene)};
 
 #if HAS_WINDOW
 
