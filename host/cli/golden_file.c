@@ -6,6 +6,7 @@
 #include "host/image/image.h"
 #include "host/render/renderer.h"
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -40,64 +41,38 @@ static void golden_append(Text *text, const GoldenLine *golden)
     text_appendf(text, " tiles=");
     for (size_t i = 0; i < TILES; i++)
         text_appendf(text, "%04x", golden->tiles[i]);
-    text_appendf(text, " %s\n", golden->scene);
+    text_appendf(text, " %s", golden->scene);
 }
 
-// Reads hexadecimal digits. Returns the position after them, or NULL if there are fewer.
-static const char *hex_read(const char *at, size_t digits, uint64_t *value)
-{
-    *value = 0;
-    for (size_t i = 0; i < digits; i++, at++) {
-        const char *all = "0123456789abcdef", *digit = *at ? strchr(all, *at) : NULL;
-        if (!digit) return NULL;
-        *value = *value << 4 | (uint64_t)(digit - all);
-    }
-    return at;
-}
-
-// Reads " NAME=" and 16 digits. Returns the position after them, or NULL if they are missing.
-static const char *hash_read(const char *at, const char *name, uint64_t *hash)
-{
-    const size_t length = strlen(name);
-    if (!at || *at != ' ' || strncmp(at + 1, name, length) != 0 || at[1 + length] != '=') return NULL;
-    return hex_read(at + 2 + length, 16, hash);
-}
-
-// Reads a prefix and a number of up to nine digits. Returns the position after them, or NULL if absent.
-static const char *count_read(const char *at, const char *prefix, uint32_t *value)
-{
-    const size_t length = strlen(prefix);
-    if (!at || strncmp(at, prefix, length) != 0) return NULL;
-    at += length;
-    const size_t digits = strspn(at, "0123456789");
-    if (digits == 0 || digits > 9) return NULL;
-    *value = (uint32_t)strtoul(at, NULL, 10);
-    return at + digits;
-}
-
-// Reads a line, which ends with a NUL. Returns false if it is not a line of the file's format.
+// Reads a line, which ends with a NUL. Returns false if it is not exactly as golden_append writes it.
 static bool golden_read(GoldenLine *golden, const char *line)
 {
-    const char *at = count_read(line, "size=", &golden->width);
-    at = count_read(at, "x", &golden->height);
-    at = count_read(at, " samples=", &golden->samples);
-    at = count_read(at, " bounces=", &golden->bounces);
-    at = hash_read(at, "scene", &golden->scene_hash);
-    for (size_t i = 0; i < HASHED_COUNT; i++)
-        at = hash_read(at, layer_names[hashed_layers[i]], &golden->hashes[i]);
-    if (!at || strncmp(at, " tiles=", 7) != 0) return false;
-    at += 7;
-    for (size_t i = 0; at && i < TILES; i++) {
-        uint64_t tile;
-        at = hex_read(at, 4, &tile);
-        golden->tiles[i] = (uint16_t)tile;
-    }
-    const bool is_sound = at && *at == ' ' && at[1] != '\0' && golden->width > 0 &&
-                          golden->width <= IMAGE_SIDE_MAX && golden->height > 0 &&
+    static const char tiles[] = " tiles=";
+    int end = 0;
+    // NOLINTBEGIN(cert-err34-c): the comparison with the written line finds what sscanf misreads
+    if (sscanf(line, "size=%9ux%9u samples=%9u bounces=%9u scene=%16" SCNx64 "%n", &golden->width,
+               &golden->height, &golden->samples, &golden->bounces, &golden->scene_hash, &end) < 5)
+        return false;
+    const char *at = line + end;
+    for (size_t i = 0; i < HASHED_COUNT; i++, at += end)
+        if (sscanf(at, " %*[a-z]=%16" SCNx64 "%n", &golden->hashes[i], &end) < 1) return false;
+    if (strncmp(at, tiles, strlen(tiles)) != 0) return false;
+    at += strlen(tiles);
+    for (size_t i = 0; i < TILES; i++, at += end)
+        if (sscanf(at, "%4" SCNx16 "%n", &golden->tiles[i], &end) < 1) return false;
+    // NOLINTEND(cert-err34-c)
+    Text written = {0};
+    golden->scene = memory_copy_text(*at == ' ' ? at + 1 : "");
+    golden_append(&written, golden);
+    const bool is_sound = golden->scene[0] != '\0' && strcmp(text_c(&written), line) == 0 &&
+                          golden->width > 0 && golden->width <= IMAGE_SIDE_MAX && golden->height > 0 &&
                           golden->height <= IMAGE_SIDE_MAX && golden->samples > 0 &&
                           golden->samples <= SAMPLES_MAX && golden->bounces <= BOUNCES_MAX;
-    if (is_sound) golden->scene = memory_copy_text(at + 1);
-    return is_sound;
+    text_free(&written);
+    if (is_sound) return true;
+    free(golden->scene);
+    golden->scene = NULL;
+    return false;
 }
 
 // Adds a line of the file, which ends with a NUL. Returns what is wrong with it, or NULL. The caller frees
@@ -144,8 +119,10 @@ bool golden_file_write(const GoldenFile *file, const char *path, MessageList *me
 {
     Text text = {0};
     text_appendf(&text, "%s%s", file_head, text_c(&file->comments));
-    for (size_t i = 0; i < file->count; i++)
+    for (size_t i = 0; i < file->count; i++) {
         golden_append(&text, &file->items[i]);
+        text_append(&text, "\n", 1);
+    }
     const bool is_written = output_write_file(path, text.items, text.count, messages);
     text_free(&text);
     return is_written;
