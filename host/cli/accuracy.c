@@ -94,7 +94,7 @@ static bool reference_read(Accuracy *accuracy)
     const char *path = accuracy->options.reference_path;
     const RenderSettings *settings = &accuracy->set.variants[0].settings;
     Image image;
-    const ImageReadOptions reading = {.max_pixels = accuracy->options.variants.common.max_pixels};
+    const ImageReadOptions reading = {.max_pixels = accuracy->options.variants.common.scene.max_pixels};
     if (!image_read(&image, path, &reading, &accuracy->messages)) return false;
     const char *fault = image.display ? "display values; linear light is needed, of an .exr or .npy"
                         : image.data || image.channels != 3 ? "no colors"
@@ -231,8 +231,8 @@ static void scenes_prepare(Accuracy *accuracy)
     const CommonOptions *common = &accuracy->options.variants.common;
     accuracy->scenes = memory_allocate_zeroed(set->scene_count, sizeof *accuracy->scenes);
     accuracy->report = (AccuracyReport){.device = accuracy->open.compute.device,
-                                        .perturb_seed = common->perturb_seed,
-                                        .perturb_scale = common->perturb_scale,
+                                        .perturb_seed = common->settings.perturb_seed,
+                                        .perturb_scale = common->settings.perturb_scale,
                                         .scenes = accuracy->scenes,
                                         .scene_count = set->scene_count,
                                         .folder = accuracy->options.folder};

@@ -146,14 +146,14 @@ static Json *certify_json(const Certification *certification)
     const CertifySample *sample = &certification->sample;
     const CommonOptions *common = &certification->options->common;
     Json *json = report_json_open(2, certification->compute->device);
-    perturb_json(json, common->perturb_seed, common->perturb_scale);
+    perturb_json(json, common->settings.perturb_seed, common->settings.perturb_scale);
     json_addf(
         json,
         "scene %s size [%u %u] bounces %u min_contribution %g pixels %zu reference_bits %u reference_ms %g "
         "reference_uncertain %zu",
-        certification->options->scene, sample->width, sample->height, common->bounce_count,
-        common->min_contribution, sample->count, (unsigned)QUAD_BITS, 1e3 * certification->reference_seconds,
-        certification->uncertain_count);
+        certification->options->scene, sample->width, sample->height, common->settings.bounce_count,
+        common->settings.min_contribution, sample->count, (unsigned)QUAD_BITS,
+        1e3 * certification->reference_seconds, certification->uncertain_count);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
         row_json(json, (Precision)i, &certification->rows[i]);
@@ -258,7 +258,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 
 int command_certify(int argument_count, char **arguments)
 {
-    CertifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT,
+    CertifyOptions options = {.common.settings.bounce_count = BOUNCES_DEFAULT,
                               .common.report.table = &certify_table,
                               .pixels = PIXELS_DEFAULT};
     int status = command_line_read(&command_line, &options, argument_count, arguments);

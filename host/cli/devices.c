@@ -136,7 +136,7 @@ int command_devices(int argument_count, char **arguments)
     DeviceList list;
     device_list_open(&list, &device_warnings);
     for (size_t i = 0; i < list.count; i++)
-        list.items[i].kernel_folder = options.common.kernel_folder;
+        list.items[i].kernel_folder = options.common.driver.kernel_folder;
     MessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
     const bool is_probed = passports_find(&list, options.probes);

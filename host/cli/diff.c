@@ -270,7 +270,7 @@ static bool heatmap_make(const DiffOptions *options, const ComparedImages *compa
 static bool side_read(Image *image, const DiffOptions *options, const char *path, MessageList *messages)
 {
     const bool has_layers = image_format_of(path) == IMAGE_EXR;
-    const ImageReadOptions reading = {has_layers ? options->layer : NULL, options->common.max_pixels};
+    const ImageReadOptions reading = {has_layers ? options->layer : NULL, options->common.scene.max_pixels};
     return image_read(image, path, &reading, messages);
 }
 

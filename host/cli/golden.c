@@ -68,7 +68,7 @@ static const char *options_check(void *golden_options)
     if (options->writes && options->scenes.count == 0) return "no scene given";
     for (size_t i = 0; i < options->scenes.count; i++)
         if (strpbrk(options->scenes.items[i], "\r\n")) return "a scene's name has a line break";
-    uint32_t *size = options->common.size, *bounces = &options->common.bounce_count;
+    uint32_t *size = options->common.size, *bounces = &options->common.settings.bounce_count;
     const bool has_any = size[0] > 0 || options->samples > 0 || *bounces != BOUNCES_UNSET;
     if (!options->writes && has_any)
         return "--size, --samples and --bounces apply to write; check uses the values in the file";
@@ -183,7 +183,6 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
     Scene scene = {0};
     if (!scene_open(&scene, golden->scene, &options->common)) return EXIT_USER;
     RenderSettings settings = settings_whole(&options->common, golden->width, golden->height);
-    settings.precision = PRECISION_STRICT;
     settings.sample_count = golden->samples;
     settings.bounce_count = golden->bounces;
     settings.shift_to_eye = true;
@@ -265,7 +264,7 @@ static int scenes_write(GoldenFile *file, const GoldenOptions *options, Compute 
         golden->width = options->common.size[0];
         golden->height = options->common.size[1];
         golden->samples = options->samples;
-        golden->bounces = options->common.bounce_count;
+        golden->bounces = options->common.settings.bounce_count;
         Film film = {0};
         const int status = golden_render(golden, &film, options, compute);
         film_free(&film);
@@ -317,10 +316,10 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
 
 int command_golden(int argument_count, char **arguments)
 {
-    GoldenOptions options = {.common = {.precision = PRECISION_STRICT,
-                                        .bounce_count = BOUNCES_UNSET,
-                                        .report.table = &golden_table},
-                             .file = "golden.txt"};
+    GoldenOptions options = {
+        .common = {.settings = {.precision = PRECISION_STRICT, .bounce_count = BOUNCES_UNSET},
+                   .report.table = &golden_table},
+        .file = "golden.txt"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     GoldenFile file = {0};

@@ -40,11 +40,11 @@ const Device *device_choose_numbered(const DeviceList *devices, const char *sele
 void devices_apply_options(DeviceList *devices, const CommonOptions *common)
 {
     for (size_t i = 0; i < devices->count; i++) {
-        devices->items[i].build_options = common->build_options;
-        devices->items[i].work_group[0] = common->work_group[0];
-        devices->items[i].work_group[1] = common->work_group[1];
-        devices->items[i].kernel_folder = common->kernel_folder;
-        devices->items[i].capture_folder = common->capture_folder;
+        devices->items[i].build_options = common->driver.build_options;
+        devices->items[i].work_group[0] = common->driver.work_group[0];
+        devices->items[i].work_group[1] = common->driver.work_group[1];
+        devices->items[i].kernel_folder = common->driver.kernel_folder;
+        devices->items[i].capture_folder = common->driver.capture_folder;
     }
 }
 

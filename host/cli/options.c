@@ -19,8 +19,8 @@ static bool perturb_read(const Option *option, const char *value, void *options)
     if (!is_valid || *at != '\0')
         return option_fault(option, value, "a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d",
                             UINT32_MAX, PERTURB_SCALE_MAX);
-    common->perturb_seed = (uint32_t)seed;
-    common->perturb_scale = (uint32_t)scale;
+    common->settings.perturb_seed = (uint32_t)seed;
+    common->settings.perturb_scale = (uint32_t)scale;
     return true;
 }
 
@@ -55,37 +55,38 @@ const Option precision_option[] = {
 const Option common_options[] = {
     [COMMON_LANES] = {"lanes", "N",
                       "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)",
-                      option_choice, FIELD(lanes), NAMES(lanes_choice_names), .values = lanes_choice_values},
+                      option_choice, FIELD(settings.lanes), NAMES(lanes_choice_names),
+                      .values = lanes_choice_values},
     [COMMON_BVH] = {"bvh", "B",
                     "whether to use a BVH, which does not change the image: auto, on or off (default: auto)",
-                    option_choice, FIELD(bvh), NAMES(bvh_choice_names)},
-    [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
-    [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)}};
+                    option_choice, FIELD(settings.bvh), NAMES(bvh_choice_names)},
+    [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(settings.no_cache)},
+    [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(scene.lenient)}};
 const Option max_pixels_option[] = {{"max-pixels", "N",
                                      "refuse input images with more pixels (default: 134217728)",
-                                     option_count, FIELD(max_pixels), NUMBERS(1, UINT32_MAX)}};
+                                     option_count, FIELD(scene.max_pixels), NUMBERS(1, UINT32_MAX)}};
 const Option ray_options[] = {
     [RAY_BOUNCES] = {"bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)",
-                     option_count, FIELD(bounce_count), NUMBERS(0, BOUNCES_MAX)},
+                     option_count, FIELD(settings.bounce_count), NUMBERS(0, BOUNCES_MAX)},
     [RAY_MIN_CONTRIBUTION] = {"min-contribution", "W",
                               "trace no bounced ray whose weight in its pixel is below W (default: 0)",
-                              option_number, FIELD(min_contribution), NUMBERS(0, 1)}};
-const Option set_options[] = {{"set", "PATH=VALUE",
-                               "set a value in YAML, such as camera.fov=60; may be repeated", option_texts,
-                               FIELD(overrides)},
-                              {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(camera)}};
+                              option_number, FIELD(settings.min_contribution), NUMBERS(0, 1)}};
+const Option set_options[] = {
+    {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; may be repeated", option_texts,
+     FIELD(overrides)},
+    {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(scene.camera)}};
 const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
                                   "inject the rounding error that OpenCL permits, times SCALE (default: 1)",
                                   perturb_read, 0}};
 const Option driver_options[] = {
     {"work-group", "WxH",
      "width and height of a work-group in work-items (default: 8x8, 1x1 for lanes on a CPU, or fewer)",
-     option_work_group, FIELD(work_group)},
+     option_work_group, FIELD(driver.work_group)},
     {"build-options", "OPTIONS", "options for the driver's compiler, such as \"-cl-opt-disable\"",
-     option_text, FIELD(build_options)}};
+     option_text, FIELD(driver.build_options)}};
 const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",
                                        "write the text and the build log of each kernel that is built",
-                                       option_text, FIELD(kernel_folder), .effect = effect_folder}};
+                                       option_text, FIELD(driver.kernel_folder), .effect = effect_folder}};
 
 void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {
@@ -106,14 +107,11 @@ void messages_print(MessageList *messages, const char *path)
 
 SceneOptions scene_options_of(const CommonOptions *common)
 {
-    return (SceneOptions){.lenient = common->lenient,
-                          .overrides = common->overrides.items,
-                          .override_name = "--set",
-                          .override_count = common->overrides.count,
-                          .frame = common->frame,
-                          .max_pixels = common->max_pixels,
-                          .camera = common->camera,
-                          .stage = common->stage};
+    SceneOptions options = common->scene;
+    options.overrides = common->overrides.items;
+    options.override_name = "--set";
+    options.override_count = common->overrides.count;
+    return options;
 }
 
 bool scene_open_once(Scene *scene, const char *path, const CommonOptions *common, MessageList *printed)
@@ -143,15 +141,10 @@ bool output_overwrites_scene(const char *path, const Scene *scene, const char *s
 
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height)
 {
-    RenderSettings settings = settings_of_image(width, height, common->precision);
-    settings.lanes = common->lanes;
-    settings.bounce_count = common->bounce_count;
-    settings.min_contribution = common->min_contribution;
-    settings.bvh = common->bvh;
-    settings.no_cache = common->no_cache;
-    settings.perturb_seed = common->perturb_seed;
-    settings.perturb_scale = common->perturb_scale;
-    settings.stage = common->stage;
+    RenderSettings settings = common->settings;
+    settings.width = settings.region_width = width;
+    settings.height = settings.region_height = height;
+    settings.sample_count = 1;
     return settings;
 }
 

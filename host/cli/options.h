@@ -9,29 +9,24 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// The options for drivers, as Device has them.
+typedef struct {
+    const char *build_options;                  // NULL if not given
+    uint32_t work_group[2];                     // 0 if not given
+    const char *kernel_folder, *capture_folder; // NULL if not given
+} DriverOptions;
+
 // The options that several commands share, of which each command offers some. They are the first member of
 // the struct of every command that offers any.
 typedef struct {
-    const char *device, *reference_device;
-    Precision precision;
-    bool has_precision;  // whether --precision was given
-    unsigned precisions; // a set for commands that measure several
-    uint32_t lanes;      // 0 for the device's default
-    BvhChoice bvh;
-    bool no_cache, lenient;
-    uint32_t size[2]; // of the image, 0 if not given
-    uint32_t bounce_count;
-    double min_contribution;
-    uint32_t perturb_seed, perturb_scale; // 0 if not given
-    const char *build_options;            // NULL if not given
-    uint32_t work_group[2];               // 0 if not given
-    const char *kernel_folder;            // NULL if not given
-    const char *capture_folder;           // NULL if not given
-    uint32_t max_pixels;                  // of each image that is read, 0 for the default
-    OptionTexts overrides;                // --set, in order
-    const char *camera;                   // the scene of --camera, NULL if not given
-    double frame;                         // of an animated scene
-    Stage *stage;                         // records long operations; may be NULL
+    const char *device, *reference_device; // NULL if not given
+    DriverOptions driver;
+    SceneOptions scene;      // without its overrides
+    OptionTexts overrides;   // --set, in order
+    RenderSettings settings; // without the image's size and samples
+    bool has_precision;      // whether --precision was given
+    unsigned precisions;     // a set for commands that measure several
+    uint32_t size[2];        // of the image, 0 if not given
     ReportOptions report;
 } CommonOptions;
 
@@ -55,7 +50,7 @@ extern const Option max_pixels_option[1];   // of commands that read images
 // The option of the first `count` precisions, one of which is chosen.
 #define PRECISION_OPTION(help_text, count)                                                                   \
     {                                                                                                        \
-        "precision", "P", help_text, option_choice, offsetof(CommonOptions, precision),                      \
+        "precision", "P", help_text, option_choice, offsetof(CommonOptions, settings.precision),             \
             .given = offsetof(CommonOptions, has_precision), .names = precision_names, .name_count = count   \
     }
 // The option of a set of precisions, with the default that its help names.

@@ -124,7 +124,7 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     RenderDevices *open = &command->open;
     RenderOptions *options = &command->options;
     options->scene = render_command_scene(command, index);
-    if (options->frame_count > 0) options->common.frame = options->first_frame + (double)index;
+    if (options->frame_count > 0) options->common.scene.frame = options->first_frame + (double)index;
     if (options->skips_existing && image_exists(options, command->paths[index])) return EXIT_DONE;
     render_devices_rest(open);
     interrupts_end_at_once(); // nothing checks the flag while a scene is read

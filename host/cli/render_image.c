@@ -263,7 +263,7 @@ static bool scene_advance(ImageRender *render)
 {
     const double start = clock_seconds();
     scene_free(render->scene);
-    render->options->common.frame = shutter_frame(&render->shutter);
+    render->options->common.scene.frame = shutter_frame(&render->shutter);
     const bool is_read =
         scene_open_once(render->scene, render->options->scene, &render->options->common, render->printed);
     render->scene->animation.frame = render->shutter.frame;
@@ -304,7 +304,7 @@ static int scene_render(ImageRender *render)
     open->has_warned_of_frames = true;
     stage_begin(render->times->stage, "opening the devices", NULL, 0);
     if (!render_devices_open(open, &options->common)) return EXIT_USER;
-    if (options->common.capture_folder && open->count > 1) {
+    if (options->common.driver.capture_folder && open->count > 1) {
         option_usage_fault("render", "--capture needs a single device");
         return EXIT_USER;
     }
@@ -318,19 +318,21 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     const double start = clock_seconds();
     int status = EXIT_USER;
     options.output.path = path;
-    if (ranks && (common->work_group[0] > 0 || common->build_options || common->capture_folder)) {
+    if (ranks &&
+        (common->driver.work_group[0] > 0 || common->driver.build_options || common->driver.capture_folder)) {
         option_usage_fault("render",
                            "--work-group, --build-options and --capture need glint render, a single process");
         return EXIT_USER;
     }
-    if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
+    Stage *stage = options.timing == TIMING_TRACE ? stage_open(true) : NULL;
+    options.common.scene.stage = options.common.settings.stage = stage;
     MessageList printed = {0};
     if (image_output_path_known(path) && scene_open_once(&scene, options.scene, common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
-        HostTimes times = {.frame = options.frame_count > 0 ? common->frame : NAN,
+        HostTimes times = {.frame = options.frame_count > 0 ? common->scene.frame : NAN,
                            .is_several = options.has_several,
                            .parse_seconds = clock_seconds() - start,
-                           .stage = common->stage};
+                           .stage = stage};
         ImageRender render = {.options = &options,
                               .scene = &scene,
                               .open = open,
@@ -341,6 +343,6 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     }
     message_list_free(&printed);
     scene_free(&scene);
-    stage_close(common->stage);
+    stage_close(stage);
     return status;
 }

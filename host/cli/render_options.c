@@ -198,7 +198,7 @@ static const Option command_options[] = {
      frames_read, 0},
     {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
-     FIELD(common.capture_folder), .effect = effect_empty_folder},
+     FIELD(common.driver.capture_folder), .effect = effect_empty_folder},
     {"format", "F", "format of --output -: png, ppm or npy", option_choice, FIELD(output.stdout_format),
      NAMES(format_names), .values = format_values, .given = FIELD(has_format)},
     {"quiet", NULL, "print no progress", option_flag, FIELD(quiet)}};
@@ -236,8 +236,8 @@ static const CommandLine command_line = {
 
 int render_options_read(RenderOptions *options, int argument_count, char **arguments)
 {
-    *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
-                               .common.bounce_count = BOUNCES_DEFAULT,
+    *options = (RenderOptions){.common.settings.precision = PRECISION_SINGLE,
+                               .common.settings.bounce_count = BOUNCES_DEFAULT,
                                .sample_count = 1,
                                .output.bits = 8};
     const int status = command_line_read(&command_line, options, argument_count, arguments);

@@ -62,11 +62,14 @@ static void passed_list(ReportChoice *choice)
     const CommonOptions *common = &choice->common;
     char **next = choice->passed;
     if (common->device) *next++ = text_format("--device=%s", common->device);
-    if (common->has_precision) *next++ = text_format("--precision=%s", precision_names[common->precision]);
-    if (common->lanes > 0) *next++ = text_format("--lanes=%u", common->lanes);
-    if (common->work_group[0] > 0)
-        *next++ = text_format("--work-group=%ux%u", common->work_group[0], common->work_group[1]);
-    if (common->build_options) *next++ = text_format("--build-options=%s", common->build_options);
+    if (common->has_precision)
+        *next++ = text_format("--precision=%s", precision_names[common->settings.precision]);
+    if (common->settings.lanes > 0) *next++ = text_format("--lanes=%u", common->settings.lanes);
+    if (common->driver.work_group[0] > 0)
+        *next++ =
+            text_format("--work-group=%ux%u", common->driver.work_group[0], common->driver.work_group[1]);
+    if (common->driver.build_options)
+        *next++ = text_format("--build-options=%s", common->driver.build_options);
     choice->passed_count = (size_t)(next - choice->passed);
 }
 

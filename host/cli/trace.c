@@ -92,7 +92,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         double numbers[8] = {0};
         int count = line_numbers(&report, start, end, numbers);
         const TraceRay ray = ray_make(numbers, count);
-        const char *fault = trace_ray_fault(&ray, common->precision);
+        const char *fault = trace_ray_fault(&ray, common->settings.precision);
         if (count > 0 && count != 6 && count != 8)
             report_error(&report, start, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
                          count);
@@ -159,7 +159,7 @@ static bool hits_write(const TraceOptions *options, const TraceHit *hits, size_t
     OutputFile output;
     bool written = output_open(&output, options->output, &messages);
     if (written) {
-        const Precision precision = options->common.precision;
+        const Precision precision = options->common.settings.precision;
         fprintf(output.file, "object,t,nx,ny,nz%s\n",
                 precision == PRECISION_CERTIFIED ? ",low,high,certainty" : "");
         for (size_t i = 0; i < count; i++)
@@ -181,7 +181,7 @@ static int rays_answer(const TraceOptions *options, const Scene *scene, const Ra
     TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
     int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
     for (size_t i = 0; i < rays->count; i++)
-        scaled[i] = trace_ray_scaled(rays->items[i], options->common.precision, &exponents[i]);
+        scaled[i] = trace_ray_scaled(rays->items[i], options->common.settings.precision, &exponents[i]);
     const bool traced = renderer_trace_closest(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         trace_hit_unscale(&hits[i], exponents[i]);
@@ -196,7 +196,7 @@ static int rays_answer(const TraceOptions *options, const Scene *scene, const Ra
 
 int command_trace(int argument_count, char **arguments)
 {
-    TraceOptions options = {.common.precision = PRECISION_SINGLE, .output = "-"};
+    TraceOptions options = {.common.settings.precision = PRECISION_SINGLE, .output = "-"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Scene scene = {0};
@@ -207,7 +207,7 @@ int command_trace(int argument_count, char **arguments)
         !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, &options.common)) {
         // renderer_open reports that no device works in double
-        if (options.common.precision == PRECISION_CERTIFIED)
+        if (options.common.settings.precision == PRECISION_CERTIFIED)
             reference_open(&open.compute, &open.devices, NULL);
         status = rays_answer(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);

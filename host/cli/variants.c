@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const VariantOptions variant_options_default = {.common.bounce_count = BOUNCES_DEFAULT,
+const VariantOptions variant_options_default = {.common.settings.bounce_count = BOUNCES_DEFAULT,
                                                 .common.precisions = 1u << PRECISION_SINGLE,
                                                 .bvhs = 1u << BVH_AUTO};
 
@@ -45,8 +45,8 @@ static void variant_add(VariantSet *set, const VariantOptions *options, size_t c
     Variant *variant = &set->variants[set->count];
     *variant = (Variant){.scene = &set->scenes[scene_index], .choice = choice, .settings = *settings};
     if (options->name) {
-        variant->build_options = options->common.build_options;
-        memcpy(variant->work_group, options->common.work_group, sizeof variant->work_group);
+        variant->build_options = options->common.driver.build_options;
+        memcpy(variant->work_group, options->common.driver.work_group, sizeof variant->work_group);
     }
     key.precision = precision_names[settings->precision];
     key.bvh = bvh_choice_names[settings->bvh];

@@ -288,7 +288,7 @@ static Json *journal_json(const Verification *verification)
     const VerifyOptions *options = verification->options;
     Json *json = report_json_open(3, verification->compute->device);
     json_addf(json, "reference_bits %u quick %d", (unsigned)verify_reference_bits(), options->quick);
-    perturb_json(json, options->common.perturb_seed, options->common.perturb_scale);
+    perturb_json(json, options->common.settings.perturb_seed, options->common.settings.perturb_scale);
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         const PrecisionRecord *record = &verification->journal->precisions[precision];
@@ -312,8 +312,8 @@ static int device_verify(Verification *verification, Compute *compute)
 {
     const VerifyOptions *options = verification->options;
     VerifyJournal *journal = verification->journal;
-    Precision first = options->common.has_precision ? options->common.precision : PRECISION_SINGLE;
-    Precision last = options->common.has_precision ? options->common.precision : PRECISION_DOUBLE;
+    Precision first = options->common.has_precision ? options->common.settings.precision : PRECISION_SINGLE;
+    Precision last = options->common.has_precision ? options->common.settings.precision : PRECISION_DOUBLE;
     if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
         if (options->common.has_precision) {
             fprintf(stderr, "glint: precision double: the device \"%s\" has no 64-bit floating point\n",
@@ -390,7 +390,8 @@ static void builder_start(const VerifyOptions *options)
 
 int command_verify(int argument_count, char **arguments)
 {
-    VerifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT, .common.report.table = &verify_table};
+    VerifyOptions options = {.common.settings.bounce_count = BOUNCES_DEFAULT,
+                             .common.report.table = &verify_table};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Verification verification = {.options = &options,
@@ -399,8 +400,8 @@ int command_verify(int argument_count, char **arguments)
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
     const CommonOptions *common = &options.common;
-    if (!options.common.has_precision && options.names.count == 0 && !options.lean && !common->no_cache &&
-        !common->kernel_folder)
+    if (!options.common.has_precision && options.names.count == 0 && !options.lean &&
+        !common->settings.no_cache && !common->driver.kernel_folder)
         builder_start(&options);
     return verify_journal_work(verification.journal, verification_work, &verification);
 }

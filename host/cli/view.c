@@ -21,7 +21,7 @@ typedef struct {
 static bool effect_camera_file(const Option *option, void *view_options)
 {
     const ViewOptions *options = view_options;
-    const char *camera = options->common.camera ? options->common.camera : options->scene;
+    const char *camera = options->common.scene.camera ? options->common.scene.camera : options->scene;
     const bool is_stdin = strcmp(camera, "-") == 0;
     if (is_stdin)
         fprintf(stderr, "glint: --%s: standard input cannot be written; name a YAML file\n", option->name);
@@ -122,8 +122,8 @@ static int scene_view(ViewOptions *options)
 
 int command_view(int argument_count, char **arguments)
 {
-    ViewOptions options = {.common.precision = PRECISION_SINGLE,
-                           .common.bounce_count = BOUNCES_DEFAULT,
+    ViewOptions options = {.common.settings.precision = PRECISION_SINGLE,
+                           .common.settings.bounce_count = BOUNCES_DEFAULT,
                            .sample_count = SAMPLES_DEFAULT};
     const int status = command_line_read(&command_line, &options, argument_count, arguments);
     return status == OPTIONS_READ ? scene_view(&options) : status;

@@ -23,7 +23,7 @@ int main(int argument_count, char **arguments)
         fputs("usage: kernel_text SCENE PRECISION\n", stderr);
         return EXIT_FAILURE;
     }
-    CommonOptions options = {.lanes = 1};
+    CommonOptions options = {.settings.lanes = 1};
     Scene scene;
     OpenDevice open;
     if (!precision_option->read(precision_option, arguments[2], &options) ||
