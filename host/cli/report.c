@@ -1,7 +1,5 @@
 // glint report runs the commands that a bug report needs, each in a separate process, and writes one archive.
 // With reports of glint bench it compares these instead.
-#include "host/api/version.h"
-#include "host/base/archive.h"
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
@@ -9,11 +7,10 @@
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
-#include "host/cli/report_scrub.h"
+#include "host/cli/report_archive.h"
 #include "host/cli/report_versions.h"
 #include "host/cli/side_by_side.h"
 #include "host/cli/variants.h"
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
@@ -24,6 +21,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 static const char scene_text[] = "# What glint bench times for glint report.\n"
@@ -141,28 +139,6 @@ typedef struct {
     char *failure; // NULL if the step has succeeded
 } StepResult;
 
-// The meanings of the archive's files, by their names or, below kernels/, by their endings.
-static const struct {
-    const char *name, *meaning;
-} meanings[] = {
-    {"index.txt", "this list"},
-    {"versions.txt",
-     "versions of glint, of its libraries and of the system, and variables that OpenCL reads"},
-    {"devices.json", "the OpenCL devices: glint devices --json"},
-    {"devices.log", "messages of this command"},
-    {"passports.json", "the devices and what their arithmetic really does: glint devices --probe --json"},
-    {"passports.log", "messages of this command"},
-    {"verify.json", "the hard cases: glint verify --quick --json"},
-    {"verify.txt", "the hard cases as text, up to a crash if there was one"},
-    {"verify.log", "messages of this command"},
-    {"scene.yaml", "the scene of glint bench"},
-    {"bench.json", "times of scene.yaml: glint bench --json"},
-    {"bench.txt", "these times as text"},
-    {"bench.log", "messages of this command"},
-    {".cl", "the text of a kernel, named by its hash"},
-    {".log", "options, status and log of each build of this kernel"},
-};
-
 static int folder_entry_remove(const char *path, const struct stat *status, int type, struct FTW *walk)
 {
     (void)status, (void)type, (void)walk;
@@ -176,32 +152,27 @@ static void folder_remove(const char *path)
     nftw(path, folder_entry_remove, OPEN_FOLDERS_MAX, FTW_DEPTH | FTW_PHYS);
 }
 
-static bool file_write(const char *folder, const char *name, const char *text)
-{
-    char *path = text_format("%s/%s", folder, name);
-    FILE *file = fopen(path, "w");
-    bool written = file && fputs(text, file) >= 0;
-    if (file && fclose(file) != 0) written = false;
-    free(path);
-    return written;
-}
-
 // Creates the folder in which the steps run. The caller removes and frees it. Returns NULL with a message on
 // failure.
 static char *steps_folder_create(void)
 {
     const char *parent = getenv("TMPDIR");
     char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
-    if (!mkdtemp(folder)) {
-        fprintf(stderr, "glint report: cannot create the folder '%s': %s\n", folder, strerror(errno));
-        free(folder);
-        return NULL;
-    }
-    if (file_write(folder, "scene.yaml", scene_text)) return folder;
-    fprintf(stderr, "glint report: cannot write to '%s': %s\n", folder, strerror(errno));
-    folder_remove(folder);
+    if (mkdtemp(folder)) return folder;
+    fprintf(stderr, "glint report: cannot create the folder '%s': %s\n", folder, strerror(errno));
     free(folder);
     return NULL;
+}
+
+// Writes the scene that glint bench renders. Returns false with a message on failure.
+static bool scene_write(const char *folder)
+{
+    MessageList messages = {0};
+    char *path = text_format("%s/scene.yaml", folder);
+    const bool is_written = output_write_file(path, scene_text, sizeof scene_text - 1, &messages);
+    messages_print(&messages, NULL);
+    free(path);
+    return is_written;
 }
 
 // Places the steps' temporary files and kernel caches in the folder. The caches are empty, so every kernel
@@ -284,99 +255,17 @@ static StepResult step_run(const Step *step, const ReportChoice *choice, const c
     return result;
 }
 
-static const char *meaning_of(const char *name)
-{
-    const bool is_kernel = strchr(name, '/') != NULL;
-    const char *key = is_kernel ? strrchr(name, '.') : name;
-    for (size_t i = 0; i < COUNT_OF(meanings); i++)
-        if (strcmp(meanings[i].name, key) == 0) return meanings[i].meaning;
-    return "";
-}
-
-typedef struct {
-    Text tar, list; // `list` has a line per file
-    size_t count;
-    time_t now;
-} Archive;
-
-static void file_add(Archive *archive, const char *name, const Text *contents)
-{
-    archive_add(&archive->tar, name, contents, archive->now);
-    text_appendf(&archive->list, "  %-29s %s\n", name, meaning_of(name));
-    archive->count++;
-}
-
-// Adds a file of the folder unless it is empty or missing. Kernels have only glint's text; they are kept.
-static void folder_file_add(Archive *archive, const char *folder, const char *name, const Scrubber *scrubber)
-{
-    char *path = text_format("%s/%s", folder, name);
-    Text contents = {0};
-    MessageList ignored = {0};
-    const char *ending = strrchr(name, '.');
-    if (text_read_file(&contents, path, &ignored) && contents.count > 0) {
-        Text scrubbed = strcmp(ending, ".cl") == 0 ? contents : scrub(scrubber, &contents);
-        file_add(archive, name, &scrubbed);
-        if (scrubbed.items != contents.items) text_free(&scrubbed);
-    }
-    message_list_free(&ignored);
-    text_free(&contents);
-    free(path);
-}
-
-static int is_kernel_file(const struct dirent *entry)
-{
-    return entry->d_name[0] != '.';
-}
-
-static void kernels_add(Archive *archive, const char *folder, const Scrubber *scrubber)
-{
-    char *path = text_format("%s/kernels", folder);
-    struct dirent **entries;
-    const int count = scandir(path, &entries, is_kernel_file, alphasort);
-    for (int i = 0; i < count; i++) {
-        char *name = text_format("kernels/%s", entries[i]->d_name);
-        folder_file_add(archive, folder, name, scrubber);
-        free(name);
-        free(entries[i]);
-    }
-    if (count >= 0) free(entries);
-    free(path);
-}
-
-static Text index_text(const Archive *archive, const StepResult *results)
+// Returns a line for each step. Adds a warning for each that failed.
+static Text results_text(const StepResult *results, MessageList *messages)
 {
     Text text = {0};
-    char date[32] = "";
-    struct tm utc;
-    if (gmtime_r(&archive->now, &utc)) strftime(date, sizeof date, "%Y-%m-%d %H:%M UTC", &utc);
-    text_appendf(&text,
-                 "Report of glint %s, %s. Folders are replaced by ~ or PATH, and the names of the user and "
-                 "the host by USER\nand HOST.\n\nSteps\n\n",
-                 glint_version(), date);
-    for (size_t i = 0; i < STEP_COUNT; i++)
-        text_appendf(&text, "  %-10s %s%s, %.1f s\n", steps[i].name, results[i].failure ? "FAILED: " : "done",
-                     results[i].failure ? results[i].failure : "", results[i].seconds);
-    text_appendf(&text, "\nFiles\n\n  %-29s %s\n%s", "index.txt", meaning_of("index.txt"),
-                 text_c(&archive->list));
+    for (size_t i = 0; i < STEP_COUNT; i++) {
+        const char *failure = results[i].failure;
+        text_appendf(&text, "  %-10s %s%s, %.1f s\n", steps[i].name, failure ? "FAILED: " : "done",
+                     failure ? failure : "", results[i].seconds);
+        if (failure) message_warning(messages, "the step %s failed: %s", steps[i].name, failure);
+    }
     return text;
-}
-
-// Writes the files of the folder into the archive. The index comes first.
-static bool archive_files(Archive *archive, const char *folder, const StepResult *results,
-                          const Scrubber *scrubber, OutputFile *output, MessageList *messages)
-{
-    for (size_t i = 0; i < COUNT_OF(meanings); i++)
-        if (strchr(meanings[i].name, '.') != meanings[i].name)
-            folder_file_add(archive, folder, meanings[i].name, scrubber);
-    kernels_add(archive, folder, scrubber);
-    Text index = index_text(archive, results), tar = {0};
-    archive_add(&tar, "index.txt", &index, archive->now);
-    archive->count++;
-    text_append(&tar, text_c(&archive->tar), archive->tar.count);
-    const bool is_written = archive_write(&tar, output, messages) && output_commit(output, messages);
-    text_free(&tar);
-    text_free(&index);
-    return is_written;
 }
 
 // Runs the steps and writes the archive. Returns the exit status.
@@ -384,10 +273,7 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
 {
     Progress progress;
     StepResult results[STEP_COUNT] = {0};
-    Archive archive = {.now = time(NULL)};
-    Scrubber scrubber = scrubber_open(folder);
-    Text versions = report_versions(&scrubber);
-    file_add(&archive, "versions.txt", &versions);
+    Text versions = report_versions(folder);
     variables_set(folder);
     progress_open(&progress, false);
     for (size_t i = 0; i < STEP_COUNT && !is_interrupted(); i++)
@@ -396,20 +282,16 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     int status = EXIT_INTERRUPTED;
     if (!is_interrupted()) {
         MessageList messages = {0};
-        for (size_t i = 0; i < STEP_COUNT; i++)
-            if (results[i].failure)
-                message_warning(&messages, "the step %s failed: %s", steps[i].name, results[i].failure);
-        status =
-            archive_files(&archive, folder, results, &scrubber, output, &messages) ? EXIT_DONE : EXIT_USER;
+        Text lines = results_text(results, &messages);
+        const size_t count = report_archive_write(output, folder, &versions, text_c(&lines), &messages);
+        status = count > 0 ? EXIT_DONE : EXIT_USER;
         messages_print(&messages, NULL);
-        if (status == EXIT_DONE) printf("%s: %zu files\n", choice->output, archive.count);
+        text_free(&lines);
+        if (status == EXIT_DONE) printf("%s: %zu files\n", choice->output, count);
     }
     for (size_t i = 0; i < STEP_COUNT; i++)
         free(results[i].failure);
-    text_free(&archive.tar);
-    text_free(&archive.list);
     text_free(&versions);
-    scrubber_close(&scrubber);
     return status;
 }
 
@@ -424,7 +306,7 @@ static int archive_make(ReportChoice *choice)
     messages_print(&messages, NULL);
     if (!is_open) return EXIT_USER;
     char *folder = steps_folder_create();
-    const int status = folder ? report_make(choice, folder, &output) : EXIT_MACHINE;
+    const int status = folder && scene_write(folder) ? report_make(choice, folder, &output) : EXIT_MACHINE;
     if (folder) folder_remove(folder);
     free(folder);
     if (status != EXIT_DONE) output_abandon(&output);

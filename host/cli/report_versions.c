@@ -1,7 +1,8 @@
 #include "host/cli/report_versions.h"
+
 #include "host/api/version.h"
 #include "host/base/array.h"
-
+#include "host/cli/report_scrub.h"
 #include <assimp/version.h>
 #include <jansson.h>
 #include <libfyaml.h>
@@ -69,9 +70,10 @@ static void variables_append(Text *text, const Scrubber *scrubber)
             }
 }
 
-Text report_versions(const Scrubber *scrubber)
+Text report_versions(const char *folder)
 {
     Text text = {0};
+    Scrubber scrubber = scrubber_open(folder);
     struct utsname host = {0};
     uname(&host);
     version_append(&text, "glint", glint_version());
@@ -83,6 +85,7 @@ Text report_versions(const Scrubber *scrubber)
     version_append(&text, "kernel release", host.release);
     version_append(&text, "machine", host.machine);
     text_appendf(&text, "%-20s %ld\n\n", "processors", sysconf(_SC_NPROCESSORS_ONLN));
-    variables_append(&text, scrubber);
+    variables_append(&text, &scrubber);
+    scrubber_close(&scrubber);
     return text;
 }
