@@ -5,7 +5,7 @@
 #include "host/cli/accuracy_page.h"
 #include "host/cli/accuracy_report.h"
 #include "host/cli/commands.h"
-#include "host/cli/image_output.h"
+#include "host/cli/film_files.h"
 #include "host/cli/open_device.h"
 #include "host/cli/page.h"
 #include "host/cli/variants.h"

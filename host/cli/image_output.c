@@ -3,18 +3,13 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/base/numbers.h"
 #include "host/base/text.h"
+#include "host/cli/band_values.h"
+#include "host/cli/film_files.h"
 #include <errno.h>
-#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct {
-    void *items;
-    size_t capacity;
-} Scratch;
 
 struct ImageOutput {
     const ImageOutputOptions *options;
@@ -22,8 +17,7 @@ struct ImageOutput {
     ImageOrigin origin;
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT]; // of the files that are open
-    Scratch converted[LAYER_COUNT];         // a band's values in other types
-    Scratch positions, foreground;
+    BandValues values;
     double bytes; // the size of all files before compression
 
     // A separate thread writes a band while the next is rendered. Until that thread has ended, all members
@@ -32,7 +26,7 @@ struct ImageOutput {
     bool writing, failed;
     MessageList *messages;
     Film band;
-    Scratch layers[LAYER_COUNT]; // the memory of the band's layers
+    BandScratch layers[LAYER_COUNT]; // the memory of the band's layers
     double seconds;
 
     RerenderCounts rerenders; // the sum over all bands so far
@@ -46,7 +40,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOri
     *output = (ImageOutput){.options = options,
                             .format = image_output_is_stdout(options->path) ? options->stdout_format
                                                                             : image_format_of(options->path),
-                            .origin = *origin};
+                            .origin = *origin,
+                            .values.eye = origin->scene->camera.position};
     return output;
 }
 
@@ -59,21 +54,6 @@ static bool is_exr(const ImageOutput *output)
 static bool keeps_bands(const ImageOutput *output)
 {
     return output->origin.settings->precision == PRECISION_CERTIFIED && is_exr(output);
-}
-
-static ImageHeader layer_header(const Film *film, Layer layer)
-{
-    bool integer = layer_types[layer] == LAYER_TYPE_INTEGER;
-    return (ImageHeader){
-        .format = IMAGE_NPY,
-        .width = film->width,
-        .height = film->height,
-        .channels = film_components(film, layer),
-        .bits = 8,
-        .npy_type = integer           ? 'u'
-                    : film->is_double ? 'd'
-                                      : 'f',
-    };
 }
 
 // Returns whether the AOV is written. The shadow masks of a scene without lights are not.
@@ -112,7 +92,7 @@ static void channel_names_append(Text *names, const Film *film, Layer layer)
 static bool image_open(ImageOutput *output, const Film *film, const ImageNote *notes, MessageList *messages)
 {
     const RenderSettings *settings = output->origin.settings;
-    ImageHeader header = layer_header(film, LAYER_COLOR);
+    ImageHeader header = film_layer_header(film, LAYER_COLOR);
     header.format = output->format;
     header.transfer = output->options->transfer;
     header.bits = output->options->bits;
@@ -159,7 +139,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         message_warning(messages, "no shadow masks are written: the scene has no lights");
     for (Layer layer = 0; layer < LAYER_COUNT && opened; layer++) {
         if (!is_written(output, &film, layer) || is_exr(output)) continue;
-        ImageHeader header = layer_header(&film, layer);
+        ImageHeader header = film_layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
         char *path = image_output_aov_path(output->options, layer_names[layer]);
         output->aovs[layer] = image_writer_open(path, &header, messages);
@@ -170,80 +150,25 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     return opened;
 }
 
-static void *scratch_reserve(Scratch *scratch, size_t size)
-{
-    if (scratch->capacity < size) {
-        scratch->items = memory_resize(scratch->items, size, 1);
-        scratch->capacity = size;
-    }
-    return scratch->items;
-}
-
-// Converts positions from relative to the eye to the world, in double so that no bit is lost.
-static const double *positions_in_world(ImageOutput *output, const Film *band)
-{
-    size_t count = 3 * film_pixel_count(band);
-    double *world = scratch_reserve(&output->positions, count * sizeof *world);
-    numbers_widen(world, band->layers[LAYER_POSITION], count, band->is_double);
-    Vector3 eye = output->origin.scene->camera.position;
-    const double axes[3] = {eye.x, eye.y, eye.z};
-    for (size_t i = 0; i < count; i++)
-        world[i] += axes[i % 3];
-    return world;
-}
-
-// Returns a layer's values as NPY files have them.
-static const void *layer_values(ImageOutput *output, const Film *band, Layer layer)
-{
-    return layer == LAYER_POSITION ? positions_in_world(output, band) : band->layers[layer];
-}
-
-// Returns a layer's values as other formats have them, in 32 bits.
-static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer layer)
-{
-    const void *values = layer_values(output, band, layer);
-    if (layer_types[layer] == LAYER_TYPE_INTEGER || (!band->is_double && layer != LAYER_POSITION))
-        return values;
-    const size_t count = film_pixel_count(band) * film_components(band, layer);
-    float *narrow = scratch_reserve(&output->converted[layer], count * sizeof *narrow);
-    numbers_narrow(narrow, values, count);
-    return narrow;
-}
-
-// Returns the colors without the background. In PNG they are those of the covered part of the pixel, in EXR
-// they are multiplied by that part.
-static const float *colors_without_background(ImageOutput *output, const Film *band)
-{
-    const size_t count = film_pixel_count(band);
-    const float *colors = layer_narrowed(output, band, LAYER_COLOR),
-                *backdrop = layer_narrowed(output, band, LAYER_BACKDROP),
-                *coverage = layer_narrowed(output, band, LAYER_COVERAGE);
-    float *foreground = scratch_reserve(&output->foreground, 3 * count * sizeof *foreground);
-    for (size_t i = 0; i < count; i++) {
-        const float part = is_exr(output) || coverage[i] == 0 ? 1 : coverage[i];
-        for (size_t k = 3 * i; k < 3 * i + 3; k++)
-            foreground[k] = coverage[i] == 0 ? 0 : fmaxf(colors[k] - backdrop[k], 0) / part;
-    }
-    return foreground;
-}
-
 static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
+    BandValues *values = &output->values;
     MessageList *messages = output->messages;
     const bool is_npy = output->format == IMAGE_NPY;
     const void *arrays[LAYER_COUNT + 2];
     size_t count = 0;
-    arrays[count++] = output->options->alpha ? colors_without_background(output, band)
+    arrays[count++] = output->options->alpha ? band_foreground(values, band, is_exr(output))
                       : is_npy               ? band->layers[LAYER_COLOR]
-                                             : layer_narrowed(output, band, LAYER_COLOR);
+                                             : band_layer_narrowed(values, band, LAYER_COLOR);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (is_exr_layer(output, band, layer)) arrays[count++] = layer_narrowed(output, band, layer);
-    if (output->options->alpha) arrays[count++] = layer_narrowed(output, band, LAYER_COVERAGE);
+        if (is_exr_layer(output, band, layer)) arrays[count++] = band_layer_narrowed(values, band, layer);
+    if (output->options->alpha) arrays[count++] = band_layer_narrowed(values, band, LAYER_COVERAGE);
     if (!image_writer_layer_rows(output->image, arrays, band->height, messages)) return false;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (output->aovs[layer] && !image_writer_rows(output->aovs[layer], layer_values(output, band, layer),
-                                                      band->height, messages))
+        if (output->aovs[layer] &&
+            !image_writer_rows(output->aovs[layer], band_layer_values(values, band, layer), band->height,
+                               messages))
             return false;
     return true;
 }
@@ -273,7 +198,7 @@ static void band_keep(ImageOutput *output, const Film *band)
         if (!band->layers[layer]) continue;
         size_t size = film_layer_size(band, layer);
         output->band.layers[layer] =
-            memcpy(scratch_reserve(&output->layers[layer], size), band->layers[layer], size);
+            memcpy(band_scratch_reserve(&output->layers[layer], size), band->layers[layer], size);
     }
 }
 
@@ -334,12 +259,9 @@ static void image_output_free(ImageOutput *output)
     for (size_t i = 0; i < output->kept.count; i++)
         film_free(&output->kept.items[i]);
     free(output->kept.items);
-    free(output->positions.items);
-    free(output->foreground.items);
-    for (Layer i = 0; i < LAYER_COUNT; i++) {
-        free(output->converted[i].items);
+    band_values_free(&output->values);
+    for (Layer i = 0; i < LAYER_COUNT; i++)
         free(output->layers[i].items);
-    }
     free(output);
 }
 
@@ -390,30 +312,4 @@ void image_output_abandon(ImageOutput *output)
         image_writer_abandon(output->aovs[i]);
     image_writer_abandon(output->image);
     image_output_free(output);
-}
-
-static bool layer_save(const Film *film, Layer layer, const char *path, MessageList *messages)
-{
-    const ImageHeader header = layer_header(film, layer);
-    const size_t count = film_pixel_count(film) * header.channels;
-    float *narrow = NULL;
-    if (header.npy_type == 'f') {
-        narrow = memory_allocate(count, sizeof *narrow);
-        numbers_narrow(narrow, film->layers[layer], count);
-    }
-    const bool saved = image_write(path, &header, narrow ? narrow : film->layers[layer], messages);
-    free(narrow);
-    return saved;
-}
-
-bool film_save(const Film *film, const char *prefix, MessageList *messages)
-{
-    bool saved = true;
-    for (Layer layer = 0; layer < LAYER_COUNT && saved; layer++) {
-        if (!film->layers[layer] || film_components(film, layer) == 0) continue;
-        char *path = text_format("%s.%s.npy", prefix, layer_names[layer]);
-        saved = layer_save(film, layer, path, messages);
-        free(path);
-    }
-    return saved;
 }

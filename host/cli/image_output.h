@@ -20,8 +20,3 @@ RerenderCounts image_output_rerenders(const ImageOutput *output);
 // Sets *seconds to the time spent on encoding and writing, even if other work ran at the same time.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);
 void image_output_abandon(ImageOutput *output);
-
-// Writes PREFIX.color.npy, PREFIX.t.npy and so on, each layer of the film in the precision in which it was
-// computed. Without lights there is no PREFIX.shadow.npy. Returns false with a message if a file could not be
-// written.
-bool film_save(const Film *film, const char *prefix, MessageList *messages);
