@@ -17,21 +17,18 @@ typedef struct {
 
 enum { NOTE_COUNT_MAX = 26 };
 
-// Keys and values, each of which ends with a NUL, and their offsets in the text.
 typedef struct {
-    Text text;
-    size_t starts[NOTE_COUNT_MAX][2];
+    ImageNote items[NOTE_COUNT_MAX + 1]; // up to the first without a key
     size_t count;
 } ImageNotes;
 
 // The key of the counts of re-rendered samples.
 extern const char certified_key[];
 
-// Appends the value of certified_key.
-void counts_describe(Text *text, const RerenderCounts *counts);
+// Returns the value of certified_key. The caller frees it.
+char *counts_describe(const RerenderCounts *counts);
 // Adds all notes of an image. `counts` is NULL if the counts are not known yet or the precision is not
-// `certified`. The caller frees the text.
+// `certified`.
 void image_notes_add_all(ImageNotes *notes, const ImageOrigin *origin, const ImageOutputOptions *options,
                          ImageFormat format, const RerenderCounts *counts);
-// Fills the list, which ends with an empty note and points into the notes.
-void image_notes_list(const ImageNotes *notes, ImageNote list[NOTE_COUNT_MAX + 1]);
+void image_notes_free(ImageNotes *notes);

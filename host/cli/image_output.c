@@ -128,12 +128,10 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     const RerenderCounts *counts = keeps_bands(output) ? &output->rerenders : NULL;
     ImageNotes notes = {0};
     image_notes_add_all(&notes, &output->origin, output->options, output->format, counts);
-    ImageNote list[NOTE_COUNT_MAX + 1];
-    image_notes_list(&notes, list);
     Film film = *band;
     film.height = output->origin.settings->region_height;
-    bool opened = image_open(output, &film, list, messages);
-    text_free(&notes.text);
+    bool opened = image_open(output, &film, notes.items, messages);
+    image_notes_free(&notes);
 
     if (opened && (output->options->aovs & AOV_SHADOW) && !is_written(output, &film, LAYER_SHADOW))
         message_warning(messages, "no shadow masks are written: the scene has no lights");
@@ -241,11 +239,9 @@ static bool kept_write(ImageOutput *output, MessageList *messages)
 static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
     if (output->origin.settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
-    Text text = {0};
-    counts_describe(&text, &output->rerenders);
-    const ImageNote note = {certified_key, text_c(&text)};
-    const bool written = image_writer_note(output->image, &note, messages);
-    text_free(&text);
+    char *counts = counts_describe(&output->rerenders);
+    const bool written = image_writer_note(output->image, &(ImageNote){certified_key, counts}, messages);
+    free(counts);
     return written;
 }
 

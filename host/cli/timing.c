@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 // Sums over launches, by events where they are trusted, and by the host's clock.
 typedef struct {
@@ -116,10 +117,9 @@ static void pilot_print(const Pilot *pilot)
 static void rerenders_print(RerenderCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    Text text = {0};
-    counts_describe(&text, &counts);
-    fprintf(stderr, "certified: %s\n", text_c(&text));
-    text_free(&text);
+    char *text = counts_describe(&counts);
+    fprintf(stderr, "certified: %s\n", text);
+    free(text);
 }
 
 static void text_print(const ImageOrigin *origin, const HostTimes *host)
