@@ -1,6 +1,7 @@
 #include "host/cli/image_paths.h"
 
 #include "host/base/file.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
 #include <stdlib.h>
@@ -35,47 +36,39 @@ char *image_output_aov_path(const ImageOutputOptions *options, const char *name)
     return text_format("%.*s.%s.npy", (int)(dot - options->path), options->path, name);
 }
 
-// Returns whether `is_so` is true for every file of the image. Stops at the first that it is not true for.
-static bool files_all(const ImageOutputOptions *options, bool (*is_so)(const char *path, void *context),
-                      void *context)
+// Returns the name of the image's file with this index, of which the first is the image and the others are
+// its AOVs, or NULL past the last. The caller frees it.
+static char *file_path(const ImageOutputOptions *options, size_t index)
 {
-    bool all = is_so(options->path, context);
+    if (index == 0) return memory_copy_text(options->path);
     const bool is_one_file = image_format_of(options->path) == IMAGE_EXR;
-    for (Layer layer = 0; layer < LAYER_COUNT && all && !is_one_file; layer++) {
-        if (!(options->aovs >> layer & 1)) continue;
-        char *path = image_output_aov_path(options, layer_names[layer]);
-        all = is_so(path, context);
-        free(path);
-    }
-    return all;
-}
-
-typedef struct {
-    const Scene *scene;
-    const char *path;
-} SceneFile;
-
-static bool file_keeps_scene(const char *path, void *context)
-{
-    const SceneFile *file = context;
-    return !output_overwrites_scene(path, file->scene, file->path);
+    for (Layer layer = 0; layer < LAYER_COUNT && !is_one_file; layer++)
+        if ((options->aovs >> layer & 1) && --index == 0)
+            return image_output_aov_path(options, layer_names[layer]);
+    return NULL;
 }
 
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    return !image_output_is_stdout(options->path) &&
-           !files_all(options, file_keeps_scene, &(SceneFile){scene, scene_path});
-}
-
-static bool file_exists(const char *path, void *unused)
-{
-    (void)unused;
-    struct stat status;
-    return stat(path, &status) == 0 && S_ISREG(status.st_mode);
+    bool overwrites = false;
+    char *path;
+    for (size_t i = 0;
+         !image_output_is_stdout(options->path) && !overwrites && (path = file_path(options, i)); i++) {
+        overwrites = output_overwrites_scene(path, scene, scene_path);
+        free(path);
+    }
+    return overwrites;
 }
 
 bool image_output_exists(const ImageOutputOptions *options)
 {
-    return files_all(options, file_exists, NULL);
+    struct stat status;
+    bool exists = true;
+    char *path;
+    for (size_t i = 0; exists && (path = file_path(options, i)); i++) {
+        exists = stat(path, &status) == 0 && S_ISREG(status.st_mode);
+        free(path);
+    }
+    return exists;
 }
