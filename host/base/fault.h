@@ -1,14 +1,7 @@
 // Bugs and lack of memory end the process. Everything else that fails is returned to the caller.
 #pragma once
 
-enum {
-    EXIT_DONE = 0,
-    EXIT_USER = 1,      // wrong usage or input
-    EXIT_MACHINE = 2,   // the device or memory failed
-    EXIT_CHECK = 3,     // diff, bench, verify, certify, golden or cache found a difference
-    EXIT_UNDECIDED = 4, // bench: the times are too noisy to compare
-    EXIT_INTERRUPTED = 130
-};
+#include "host/base/exit_status.h"
 
 // Prints `glint: format…` to stderr and exits with EXIT_MACHINE. After fault_output_is_complete, prints a
 // warning and exits with that call's status.

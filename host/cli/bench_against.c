@@ -1,7 +1,7 @@
 #include "host/cli/bench_against.h"
 
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/bench_report.h"

@@ -1,6 +1,6 @@
 // glint cache lists and checks the kernel cache, or empties it.
 #include "host/opencl/cache.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"

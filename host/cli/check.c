@@ -1,5 +1,5 @@
 // glint check reads a scene and reports its contents. It needs no device.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/file.h"
 #include "host/base/json.h"
 #include "host/base/text.h"

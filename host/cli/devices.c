@@ -1,6 +1,6 @@
 // glint devices lists every device of every platform with the properties that matter for tracing, and the
 // passports of their arithmetic.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/json.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"

@@ -1,5 +1,5 @@
 // glint diff compares two images.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"

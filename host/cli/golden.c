@@ -1,7 +1,7 @@
 // glint golden writes and checks the images of scenes at strict, which have the same bits on every device, as
 // one line per scene.
 #include "host/base/array.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"

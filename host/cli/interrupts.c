@@ -1,7 +1,7 @@
 #include "host/cli/interrupts.h"
 
 #include "host/base/array.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include <signal.h>
 #include <stddef.h>
 #include <unistd.h>

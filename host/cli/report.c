@@ -2,7 +2,7 @@
 // With reports of glint bench it compares these instead.
 #include "host/base/array.h"
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/cli/commands.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"

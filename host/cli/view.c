@@ -1,5 +1,5 @@
 // glint view shows a scene in a window.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
 #include "host/cli/interrupts.h"

@@ -1,6 +1,6 @@
 // glint view starts the window, which is a separate program, so that other commands do not load its
 // libraries. Loading them took a tenth of the processor time of a small render.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
