@@ -1,5 +1,5 @@
 // glint accuracy measures speed against error by precision, lanes, BVH choice and samples.
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/cli/accuracy_page.h"
@@ -258,18 +258,19 @@ static void scenes_prepare(Accuracy *accuracy)
 static bool has_reference(Accuracy *accuracy)
 {
     const AccuracyOptions *options = &accuracy->options;
+    Compute *compute = &accuracy->open.compute;
     const char *selector = options->variants.common.reference_device;
     const bool is_certified = options->variants.common.precisions >> PRECISION_CERTIFIED & 1;
     if (options->reference_path && !is_certified) return true;
-    if (reference_open(&accuracy->open.compute, &accuracy->open.devices, selector)) return true;
-    if (selector) return false;
-    if (options->reference_path) return true; // only the rows at certified are unavailable
+    if (!reference_open(compute, &accuracy->open.devices, selector)) return false;
+    // with a file, only the rows at certified are unavailable
+    if (options->reference_path || compute_in_double(compute)->device->fp64) return true;
     return message_error(
         &accuracy->messages,
         "neither the device \"%s\" nor another one has 64-bit floating point for a reference: "
         "name a file with --reference%s",
         // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): device_open has set it
-        accuracy->open.compute.device->name, device_fp64_hint(accuracy->open.compute.device));
+        compute->device->name, device_fp64_hint(compute->device));
 }
 
 static bool page_commit(Accuracy *accuracy)

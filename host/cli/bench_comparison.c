@@ -1,6 +1,6 @@
 #include "host/cli/bench_comparison.h"
 
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/cli/report_json.h"
 #include <math.h>
 

@@ -1,7 +1,7 @@
 // glint certify compares a scene's image at each precision with the reference, on a sample of its pixels.
 #include "host/verify/certify.h"
 #include "host/base/clock.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -231,8 +231,8 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     Compute *compute = &open->compute;
     const bool is_certified =
         !options->common.precisions || options->common.precisions >> PRECISION_CERTIFIED & 1;
-    const char *selector = options->common.reference_device;
-    if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
+    if (is_certified && !reference_open(compute, &open->devices, options->common.reference_device))
+        return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
     const RenderSettings settings = settings_of_scene(&options->common, scene);
     const double start = clock_seconds();

@@ -1,7 +1,7 @@
 #include "host/cli/open_device.h"
 
 #include "host/base/array.h"
-#include "host/base/fault.h"
+#include "host/base/exit_status.h"
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -85,7 +85,7 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
     MessageList messages = {0};
     const Device *reference = device_choose_reference(devices, selector, &messages);
     messages_print(&messages, NULL);
-    if (!reference) return false;
+    if (!reference) return !selector;
     if (!selector)
         fprintf(stderr, "glint: \"%s\" works in double for \"%s\", which has no 64-bit floating point%s\n",
                 reference->name, device->name, device_fp64_hint(device));

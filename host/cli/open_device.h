@@ -27,8 +27,8 @@ bool work_group_is_allowed(const Device *device);
 // fails, now or later.
 bool device_open(OpenDevice *open, const CommonOptions *common);
 // Opens the device that works in double for the Compute, if the user chose one or if the Compute's device has
-// no 64-bit floating point, and prints its name. Returns false if there is none, with a message if the user
-// chose one.
+// no 64-bit floating point, and prints its name. If there is none, returns false with a message if the user
+// chose one, otherwise true, and compute_in_double then returns a Compute that has no 64-bit floating point.
 bool reference_open(Compute *compute, const DeviceList *devices, const char *selector);
 // Closes a Compute at the end of a command. Returns EXIT_MACHINE with a message if the device failed,
 // otherwise `status`. Unless the command failed or was interrupted, the context lives until the process ends,

@@ -79,7 +79,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     for (size_t i = 0; i < count; i++) {
         computes[i] = open->items[i].compute;
         if (settings->precision == PRECISION_CERTIFIED &&
-            !reference_open(computes[i], &open->list, open->reference_selector) && open->reference_selector) {
+            !reference_open(computes[i], &open->list, open->reference_selector)) {
             open->is_unfit = true;
             free(computes);
             free(of_each);
