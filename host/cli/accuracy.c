@@ -277,7 +277,7 @@ static bool page_commit(Accuracy *accuracy)
 {
     if (!accuracy->options.page_path) return true;
     Text page = {0};
-    page_append(&page, "page.html", accuracy_json(&accuracy->report),
+    page_append(&page, "accuracy.html", accuracy_json(&accuracy->report),
                 accuracy_page_extras(&accuracy->report));
     bool written = output_write(&accuracy->page, page.items, page.count, &accuracy->messages) &&
                    output_commit(&accuracy->page, &accuracy->messages);
