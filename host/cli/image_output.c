@@ -16,7 +16,7 @@ struct ImageOutput {
     ImageFormat format;
     ImageOrigin origin;
     bool opened;
-    ImageWriter *image, *aovs[LAYER_COUNT]; // of the files that are open
+    ImageWriter *writers[1 + LAYER_COUNT]; // of the open files: the image, and each AOV's
     BandValues values;
     double bytes; // the size of all files before compression
 
@@ -116,11 +116,11 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
         layers[header.layer_count++] = (ImageLayer){text_c(text), film_components(film, layer), type};
     }
     if (output->options->alpha) layers[header.layer_count++] = (ImageLayer){"A", 1, 'f'};
-    output->image = image_writer_open(output->options->path, &header, messages);
+    output->writers[0] = image_writer_open(output->options->path, &header, messages);
     output->bytes = (double)image_bytes(&header);
     for (size_t i = 0; i < header.layer_count; i++)
         text_free(&names[i]);
-    return output->image != NULL;
+    return output->writers[0] != NULL;
 }
 
 static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
@@ -140,8 +140,8 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         ImageHeader header = film_layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
         char *path = image_output_aov_path(output->options, layer_names[layer]);
-        output->aovs[layer] = image_writer_open(path, &header, messages);
-        opened = output->aovs[layer] != NULL;
+        output->writers[1 + layer] = image_writer_open(path, &header, messages);
+        opened = output->writers[1 + layer] != NULL;
         output->bytes += (double)image_bytes(&header);
         free(path);
     }
@@ -162,11 +162,11 @@ static bool band_write(ImageOutput *output)
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (is_exr_layer(output, band, layer)) arrays[count++] = band_layer_narrowed(values, band, layer);
     if (output->options->alpha) arrays[count++] = band_layer_narrowed(values, band, LAYER_COVERAGE);
-    if (!image_writer_layer_rows(output->image, arrays, band->height, messages)) return false;
+    if (!image_writer_layer_rows(output->writers[0], arrays, band->height, messages)) return false;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (output->aovs[layer] &&
-            !image_writer_rows(output->aovs[layer], band_layer_values(values, band, layer), band->height,
-                               messages))
+        if (output->writers[1 + layer] &&
+            !image_writer_rows(output->writers[1 + layer], band_layer_values(values, band, layer),
+                               band->height, messages))
             return false;
     return true;
 }
@@ -240,7 +240,7 @@ static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
     if (output->origin.settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
     char *counts = counts_describe(&output->rerenders);
-    const bool written = image_writer_note(output->image, &(ImageNote){certified_key, counts}, messages);
+    const bool written = image_writer_note(output->writers[0], &(ImageNote){certified_key, counts}, messages);
     free(counts);
     return written;
 }
@@ -265,7 +265,7 @@ static void names_print(const ImageOutput *output)
 {
     fprintf(stderr, "glint: wrote %s", output->options->path);
     for (Layer i = 0; i < LAYER_COUNT; i++) {
-        if (!output->aovs[i]) continue;
+        if (!output->writers[1 + i]) continue;
         char *path = image_output_aov_path(output->options, layer_names[i]);
         fprintf(stderr, ", %s", path);
         free(path);
@@ -275,21 +275,16 @@ static void names_print(const ImageOutput *output)
 
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
+    ImageWriter **writers = output->writers;
     bool whole = kept_write(output, messages) && band_written(output) && late_notes_write(output, messages);
     const double start = clock_seconds();
-    whole = whole && image_writer_finish(output->image, messages);
-    for (Layer i = 0; i < LAYER_COUNT && whole; i++)
-        whole = !output->aovs[i] || image_writer_finish(output->aovs[i], messages);
-    if (!whole) {
-        image_output_abandon(output);
-        return false;
-    }
-    whole = image_writer_commit(output->image, messages);
-    for (Layer i = 0; i < LAYER_COUNT; i++) {
-        if (whole && output->aovs[i])
-            whole = image_writer_commit(output->aovs[i], messages);
+    for (size_t i = 0; i < COUNT_OF(output->writers) && whole; i++)
+        whole = !writers[i] || image_writer_finish(writers[i], messages);
+    for (size_t i = 0; i < COUNT_OF(output->writers); i++) {
+        if (whole && writers[i])
+            whole = image_writer_commit(writers[i], messages);
         else
-            image_writer_abandon(output->aovs[i]);
+            image_writer_abandon(writers[i]);
     }
     if (whole && image_output_is_stdout(output->options->path) && fflush(stdout) != 0) {
         whole = message_error(messages, "cannot write the standard output: %s", strerror(errno));
@@ -304,8 +299,7 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
 void image_output_abandon(ImageOutput *output)
 {
     band_written(output);
-    for (Layer i = 0; i < LAYER_COUNT; i++)
-        image_writer_abandon(output->aovs[i]);
-    image_writer_abandon(output->image);
+    for (size_t i = 0; i < COUNT_OF(output->writers); i++)
+        image_writer_abandon(output->writers[i]);
     image_output_free(output);
 }
