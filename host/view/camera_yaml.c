@@ -19,21 +19,23 @@ static void list_write(Text *text, const double *values, size_t count)
 
 void vector_write_yaml(Text *text, Vector3 v)
 {
-    list_write(text, (const double[]){v.x, v.y, v.z}, 3);
+    list_write(text, &v.x, 3);
 }
 
-static void vector_write(Text *text, const char *name, Vector3 v)
+// Writes a member of the camera: a number, or a list if `count` is above 1.
+static void member_write(Text *text, const char *name, const double *values, size_t count)
 {
-    text_appendf(text, "%s: ", name);
-    vector_write_yaml(text, v);
-    text_appendf(text, ", ");
+    const bool is_first = text->items[text->count - 1] == '{';
+    text_appendf(text, "%s%s: ", is_first ? "" : ", ", name);
+    if (count == 1)
+        number_write_yaml(text, values[0]);
+    else
+        list_write(text, values, count);
 }
 
 static void number_write(Text *text, const char *name, double value)
 {
-    text_appendf(text, "%s: ", name);
-    number_write_yaml(text, value);
-    text_appendf(text, ", ");
+    member_write(text, name, &value, 1);
 }
 
 // Returns the half tangent of an angle of view, computed as the reader does.
@@ -65,31 +67,25 @@ static double field_of_view(double half_tangent)
 void camera_write_yaml(Text *text, const Camera *camera, double aspect)
 {
     text_appendf(text, "camera: {");
-    vector_write(text, "position", camera->position);
-    vector_write(text, "look_at", camera->look_at);
-    vector_write(text, "up", camera->up);
-    if (camera->shift[0] != 0 || camera->shift[1] != 0) {
-        text_appendf(text, "shift: ");
-        list_write(text, camera->shift, 2);
-        text_appendf(text, ", ");
-    }
+    member_write(text, "position", &camera->position.x, 3);
+    member_write(text, "look_at", &camera->look_at.x, 3);
+    member_write(text, "up", &camera->up.x, 3);
+    if (camera->shift[0] != 0 || camera->shift[1] != 0) member_write(text, "shift", camera->shift, 2);
     if (camera->lens.radius > 0) {
         number_write(text, "aperture", 2 * camera->lens.radius);
-        if (camera->lens.focus == FOCUS_POINT) vector_write(text, "focus", camera->lens.point);
+        if (camera->lens.focus == FOCUS_POINT) member_write(text, "focus", &camera->lens.point.x, 3);
         if (camera->lens.focus == FOCUS_DISTANCE) number_write(text, "focus", camera->lens.distance);
     }
     if (camera->projection == PROJECTION_ORTHOGRAPHIC) {
-        text_appendf(text, "height: ");
-        number_write_yaml(text, 2 * camera->half_tangent);
+        number_write(text, "height", 2 * camera->half_tangent);
     } else if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
-        text_appendf(text, "projection: equirectangular");
+        text_appendf(text, ", projection: equirectangular");
     } else if (camera->field_axis == FIELD_VERTICAL) {
-        text_appendf(text, "fov: ");
-        number_write_yaml(text, field_of_view(camera->half_tangent));
+        number_write(text, "fov", field_of_view(camera->half_tangent));
     } else {
         const double width = 2 * camera->half_tangent;
-        text_appendf(text, "focal_length: 1, frame: ");
-        list_write(text, (const double[]){width, width / aspect}, 2);
+        number_write(text, "focal_length", 1);
+        member_write(text, "frame", (const double[]){width, width / aspect}, 2);
     }
     text_appendf(text, "}\n");
 }
