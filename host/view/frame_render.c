@@ -17,12 +17,8 @@ void probe_answer(FrameLoop *loop)
 {
     uint32_t pixel[2];
     if (!probe_acquire(loop, pixel)) return;
-    const PixelView view = {loop->renderer,
-                            &loop->scene,
-                            loop->options.scene_path,
-                            loop->current.size,
-                            loop->settings.bounce_count,
-                            loop->settings.min_contribution};
+    const PixelView view = {loop->renderer, &loop->scene, loop->options.scene_path, loop->current.size,
+                            &loop->settings};
     facts_publish(loop, pixel_facts(&view, pixel[0], pixel[1]));
 }
 

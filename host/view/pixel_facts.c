@@ -47,8 +47,8 @@ static void branch_write(PathText *tree, const Branch *branch)
 {
     const PixelView *view = tree->view;
     TraceHit hit;
-    if (branch->weight <= 0 || branch->weight < view->min_contribution ||
-        branch->depth > view->bounce_count || tree->line_count > LINES_MAX)
+    if (branch->weight <= 0 || branch->weight < view->settings->min_contribution ||
+        branch->depth > view->settings->bounce_count || tree->line_count > LINES_MAX)
         return;
     if (tree->line_count++ == LINES_MAX) {
         text_appendf(&tree->text, "and more\n");

@@ -9,8 +9,7 @@ typedef struct {
     const Scene *scene;
     const char *scene_path;
     ImageSize size;
-    uint32_t bounce_count;
-    double min_contribution;
+    const RenderSettings *settings; // whose bounces and minimum contribution are used
 } PixelView;
 
 // Traces the ray through the center of a pixel and its tree of reflected and refracted rays. Returns a line
