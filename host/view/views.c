@@ -2,6 +2,7 @@
 
 #include "host/base/memory.h"
 #include "host/image/heatmap.h"
+#include "host/image/image_metrics.h"
 #include "host/image/transfer.h"
 #include <math.h>
 #include <stdlib.h>
@@ -60,23 +61,14 @@ void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half
     }
 }
 
-static double pixel_error(const Film *film, const Film *reference, size_t pixel)
-{
-    double error = 0;
-    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
-        if (film->color[i] == reference->color[i]) continue; // equal, even if infinite
-        double difference = fabs(film->color[i] - reference->color[i]);
-        error = isnan(difference) ? INFINITY : fmax(error, difference);
-    }
-    return error;
-}
-
 double view_error(uint8_t *pixels, const Film *film, const Film *reference)
 {
     double largest = 0;
     for (size_t i = 0; i < film_pixel_count(film); i++) {
         float color[3];
-        double error = pixel_error(film, reference, i);
+        double error = 0;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++)
+            error = fmax(error, value_error(reference->color[k], film->color[k]));
         largest = fmax(largest, error);
         heatmap_error_color(error, VIEW_ERROR_WHITE, color);
         for (size_t channel = 0; channel < 3; channel++)
