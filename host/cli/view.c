@@ -81,7 +81,7 @@ static int window_show(ViewOptions *options, const Device *device)
                    .save = image_save,
                    .save_context = options},
         .size = {options->common.size[0], options->common.size[1]},
-        .stop = is_interrupted,
+        .stop = interrupts_stop,
     };
     window.frames.settings.sample_count = options->sample_count;
     window.frames.settings.shift_to_eye = true;

@@ -190,7 +190,7 @@ static WindowEnd events_run(Window *window)
         int wait = window->mouse.drag == DRAG_LOOK || window->play.is_running ? WAIT_IN_FLIGHT : WAIT_AT_REST;
         for (int had = SDL_WaitEventTimeout(&event, wait); had; had = SDL_PollEvent(&event))
             event_handle(window, &event);
-        if (window->options->stop()) return WINDOW_STOPPED;
+        if (window->options->stop(window->options->stop_context)) return WINDOW_STOPPED;
         size_read(window);
         if (window->mouse.drag == DRAG_LOOK) fly(window);
         if (window->play.is_running) play(window);
@@ -199,11 +199,6 @@ static WindowEnd events_run(Window *window)
         if (window->redraws) window_draw(window);
     }
     return WINDOW_CLOSED;
-}
-
-static void window_fault(const char *what)
-{
-    fprintf(stderr, "glint: %s: %s\n", what, SDL_GetError());
 }
 
 static void window_close(Window *window)
@@ -289,7 +284,7 @@ WindowEnd window_run(const WindowOptions *options)
               stderr);
         SDL_Quit();
     } else if (!has_video || !window_open(&window)) {
-        window_fault("no window can be opened");
+        fprintf(stderr, "glint: no window can be opened: %s\n", SDL_GetError());
         window_close(&window);
     } else {
         end = events_run(&window);

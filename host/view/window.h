@@ -4,9 +4,10 @@
 #include "host/view/frame_loop.h"
 
 typedef struct {
-    FrameLoopOptions frames; // all but notify
-    ImageSize size;          // of the window, reduced to fit the display; 0: the scene's own
-    bool (*stop)(void);      // returns true to end it, at an interrupt
+    FrameLoopOptions frames;     // all but notify
+    ImageSize size;              // of the window, reduced to fit the display; 0: the scene's own
+    bool (*stop)(void *context); // returns true to end it, at an interrupt
+    void *stop_context;
 } WindowOptions;
 
 typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT, WINDOW_REFUSED } WindowEnd;
