@@ -120,11 +120,11 @@ static int font_size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
     }
 }
 
-void caption_draw_ground(const Caption *caption, SDL_Rect place)
+void area_fill(SDL_Renderer *target, SDL_Rect area, SDL_Color color)
 {
-    SDL_SetRenderDrawBlendMode(caption->target, SDL_BLENDMODE_BLEND);
-    SDL_SetRenderDrawColor(caption->target, 0, 0, 0, 176);
-    SDL_RenderFillRect(caption->target, &place);
+    SDL_SetRenderDrawBlendMode(target, SDL_BLENDMODE_BLEND);
+    SDL_SetRenderDrawColor(target, color.r, color.g, color.b, color.a);
+    SDL_RenderFillRect(target, &area);
 }
 
 static void surface_draw(const Caption *caption, SDL_Surface *surface, int x, int y, int width)
@@ -149,7 +149,7 @@ void caption_draw(Caption *caption, CaptionPlace place, const char *text)
     if (!surface) return;
     SDL_Rect ground = {0, 0, width + 2 * PADDING, surface->h + 2 * PADDING};
     if (place == CAPTION_BOTTOM) ground.y = SDL_max(0, room.y + 2 * PADDING - ground.h);
-    caption_draw_ground(caption, ground);
+    area_fill(caption->target, ground, CAPTION_GROUND);
     surface_draw(caption, surface, PADDING, ground.y + PADDING, SDL_min(width, surface->w));
     SDL_FreeSurface(surface);
 }

@@ -24,5 +24,6 @@ void caption_draw(Caption *caption, CaptionPlace place, const char *text);
 SDL_Point caption_character(Caption *caption);
 // Draws one line with no background, from its top left.
 void caption_draw_line(Caption *caption, int x, int y, const char *text);
-// Draws the background of a caption.
-void caption_draw_ground(const Caption *caption, SDL_Rect place);
+// Draws a rectangle over what is there. Captions have a ground of CAPTION_GROUND.
+void area_fill(SDL_Renderer *target, SDL_Rect area, SDL_Color color);
+#define CAPTION_GROUND ((SDL_Color){0, 0, 0, 176})

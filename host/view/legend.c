@@ -10,15 +10,14 @@ enum { LABEL_WIDTH = 6, BAR_WIDTH = 2, LEGEND_WIDTH = 17 };
 
 static void bar_draw(SDL_Renderer *target, SDL_Rect place)
 {
-    SDL_SetRenderDrawBlendMode(target, SDL_BLENDMODE_NONE);
     for (int y = 0; y < place.h; y++) {
         float color[3];
         Uint8 bytes[3];
         heatmap_color(1 - (y + 0.5) / place.h, color);
         for (int channel = 0; channel < 3; channel++)
             bytes[channel] = (Uint8)lroundf(255 * color[channel]);
-        SDL_SetRenderDrawColor(target, bytes[0], bytes[1], bytes[2], 255);
-        SDL_RenderDrawLine(target, place.x, place.y + y, place.x + place.w - 1, place.y + y);
+        area_fill(target, (SDL_Rect){place.x, place.y + y, place.w, 1},
+                  (SDL_Color){bytes[0], bytes[1], bytes[2], 255});
     }
 }
 
@@ -32,7 +31,7 @@ void legend_draw(Caption *caption, SDL_Renderer *target, double largest_error)
     if (ground.w > room.x / 2 || ground.h > room.y / 2) return;
     ground.x = room.x - ground.w;
     ground.y = room.y - ground.h;
-    caption_draw_ground(caption, ground);
+    area_fill(target, ground, CAPTION_GROUND);
     const int left = ground.x + character.x, top = ground.y + line;
     char text[32];
     for (int i = 0; i <= HEATMAP_DECADES; i++) {

@@ -62,22 +62,16 @@ void time_line_follow(Window *window, const double at[2])
     scene_frame_show(window, (int64_t)fmax(0, fmin(frame, window->scene.frame_count - 1.0)));
 }
 
-static void area_fill(const Window *window, SDL_Rect area, SDL_Color color)
-{
-    SDL_SetRenderDrawBlendMode(window->screen.renderer, SDL_BLENDMODE_BLEND);
-    SDL_SetRenderDrawColor(window->screen.renderer, color.r, color.g, color.b, color.a);
-    SDL_RenderFillRect(window->screen.renderer, &area);
-}
-
 void time_line_draw(const Window *window)
 {
     if (!has_time_line(window)) return;
+    SDL_Renderer *target = window->screen.renderer;
     const int width = (int)window->size.width, height = time_line_height(window);
     const int top = (int)window->size.height - height;
     const int at = (int)((window->scene_frame + 0.5) / window->scene.frame_count * width);
-    area_fill(window, (SDL_Rect){0, top, width, height}, (SDL_Color){0, 0, 0, 176});
-    area_fill(window, (SDL_Rect){0, top, at, height}, (SDL_Color){255, 255, 255, 48});
-    area_fill(window, (SDL_Rect){at - MARK_WIDTH / 2, top, MARK_WIDTH, height},
+    area_fill(target, (SDL_Rect){0, top, width, height}, CAPTION_GROUND);
+    area_fill(target, (SDL_Rect){0, top, at, height}, (SDL_Color){255, 255, 255, 48});
+    area_fill(target, (SDL_Rect){at - MARK_WIDTH / 2, top, MARK_WIDTH, height},
               (SDL_Color){96, 160, 255, 255});
     char text[64];
     snprintf(text, sizeof text, "frame %u of %u", window->scene_frame, window->scene.frame_count);
