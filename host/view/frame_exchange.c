@@ -13,7 +13,7 @@
 //     have been read. Renderers poll it between launches without the mutex.
 //  6. `first_is_due` is set only by a request for a moving camera, until its first frame is published or its
 //     work ends. News does not end the render until then, so that each drag of the mouse shows frames.
-//  7. `ends` and `quits` are set once, in this order, and never cleared.
+//  7. `ends` is set once, with the mutex, and never cleared.
 //  8. Each change for which the loop may wait signals `changed`. Each one for which the window may wait calls
 //     `notify`.
 //  9. `is_stale` is set by every change to a file except the window's own writes, and cleared before the
@@ -96,7 +96,7 @@ static LoopState work_choose(const FrameLoop *loop)
 {
     const SharedState *shared = &loop->shared;
     const bool can_save = loop->is_complete && loop->renderer && loop->current.view == VIEW_COLOR;
-    if (shared->quits) return LOOP_END;
+    if (atomic_load(&loop->ends)) return LOOP_END;
     if (shared->reloads) return LOOP_RELOAD;
     if (shared->request_number != loop->current_number) return LOOP_BEGIN;
     if (loop->renderer && shared->has_probe) return LOOP_PROBE;
@@ -218,29 +218,31 @@ void frame_publish(FrameLoop *loop, uint32_t samples)
 void scene_publish(FrameLoop *loop)
 {
     const Camera *camera = &loop->scene.camera;
-    ImageSize size = {0};
-    scene_choose_image_size(&loop->scene, &size.width, &size.height);
     const char *path = loop->options.scene_path;
     const bool can_reread = strcmp(path, "-") != 0 && !file_obstacle(path);
     if (loop->current.follows_scene) loop->current.camera = *camera;
     SharedState *shared = shared_lock(loop);
     SceneUpdate *update = &shared->update;
-    update->has_new_camera |= shared->scene_state == SCENE_LOADING ||
+    update->has_new_camera |= update->state == SCENE_LOADING ||
                               (update->frame == loop->scene_frame && !cameras_equal(&update->camera, camera));
+    update->state = SCENE_LOADED;
+    update->size = (ImageSize){0};
+    scene_choose_image_size(&loop->scene, &update->size.width, &update->size.height);
     update->camera = *camera;
     update->frame = loop->scene_frame;
     update->frame_count = can_reread ? loop->scene.animation.frame_count : 0;
     update->frame_rate = loop->scene.animation.frame_rate;
     shared->has_update = true;
-    shared->scene_state = SCENE_LOADED;
-    shared->scene_size = size;
     shared_publish(loop);
 }
 
 void refusal_publish(FrameLoop *loop)
 {
     SharedState *shared = shared_lock(loop);
-    if (shared->scene_state == SCENE_LOADING) shared->scene_state = SCENE_REFUSED;
+    if (shared->update.state == SCENE_LOADING) {
+        shared->update.state = SCENE_REFUSED;
+        shared->has_update = true;
+    }
     shared_publish(loop);
 }
 
@@ -260,18 +262,9 @@ void file_changed(void *context, const char *path)
 
 void exchange_quit(FrameLoop *loop)
 {
+    shared_lock(loop);
     atomic_store(&loop->ends, true);
-    shared_lock(loop)->quits = true;
     shared_signal(loop);
-}
-
-SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
-{
-    const SharedState *shared = shared_lock(loop);
-    const SceneState state = shared->scene_state;
-    *size = shared->scene_size;
-    shared_unlock(loop);
-    return state;
 }
 
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)

@@ -63,11 +63,6 @@ void frame_loop_close(FrameLoop *loop);
 // seconds since that work began. Returns false if there is none.
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds);
 
-// LOADED: the scene was read, and `size` is its image's. REFUSED: its file has a mistake, which the message
-// states, and no scene was read before.
-typedef enum { SCENE_LOADING, SCENE_LOADED, SCENE_REFUSED } SceneState;
-SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size);
-
 typedef struct {
     Camera camera;
     bool follows_scene;   // replaces the camera by the scene's own at that frame
@@ -96,15 +91,20 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
 // Exchanges `frame` for the newest one. Returns false if there is none since the last call.
 bool frame_loop_acquire(FrameLoop *loop, Frame *frame);
 
+// A scene is refused if its file has a mistake, which the message states, and no scene was read before.
+typedef enum { SCENE_LOADING, SCENE_LOADED, SCENE_REFUSED } SceneState;
+
 // The scene that was read last.
 typedef struct {
+    SceneState state;     // the other members are set once it is loaded
+    ImageSize size;       // of its image
     Camera camera;        // the scene's own
     bool has_new_camera;  // differs from the previous one of the same frame, or is the first
     uint32_t frame;       // of the animation
     uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
     double frame_rate;    // 0: not given
 } SceneUpdate;
-// Sets `update` to the scene. Returns false if none was read since the last call.
+// Sets `update` to the scene. Returns false if none was read or refused since the last call.
 bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update);
 // Returns the messages since the last call, about mistakes, failures and saved images. Returns "" if a
 // mistake was fixed, and NULL if there are no messages. The caller frees them.

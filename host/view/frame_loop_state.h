@@ -35,8 +35,6 @@ typedef enum {
 typedef struct {
     FrameRequest request;
     unsigned request_number;
-    SceneState scene_state;
-    ImageSize scene_size;
     char *save_path, *message;
     Frame ready;
     SceneUpdate update;
@@ -45,7 +43,7 @@ typedef struct {
     Text camera_text;  // of the camera's file, as the scene was read from it or as the window wrote it
     bool is_written;   // by the window, since the scene was read
     bool is_stale;     // others have changed the scene's files since they were read
-    bool has_ready, has_update, has_probe, quits;
+    bool has_ready, has_update, has_probe;
     bool reloads; // the scene's files have changed, or have not been read
 } SharedState;
 
@@ -60,7 +58,7 @@ struct FrameLoop {
     Stage *stage;
     atomic_bool has_news;     // a request or a changed file that was not yet read
     atomic_bool first_is_due; // a moving camera's first frame, for which news does not end the render
-    atomic_bool ends;         // the current render and all later ones
+    atomic_bool ends;         // the loop, and so the current render
 
     // owned by the loop's thread
     bool is_mistaken;     // whether the scene's file, as it is now, has a mistake

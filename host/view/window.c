@@ -25,29 +25,37 @@ void message_show(Window *window, char *message)
     window->redraws = true;
 }
 
+// Returns whether two requests differ in more than the camera and the animation's frame.
+static bool is_other_image(const FrameRequest *a, const FrameRequest *b)
+{
+    return a->size.width != b->size.width || a->size.height != b->size.height || a->view != b->view ||
+           a->precision != b->precision;
+}
+
+bool request_is_due(const Window *window)
+{
+    const FrameRequest *wanted = &window->wanted, *sent = &window->sent;
+    return window->request == 0 || wanted->scene_frame != sent->scene_frame || is_other_image(wanted, sent) ||
+           !cameras_equal(&wanted->camera, &sent->camera);
+}
+
 void request_send(Window *window)
 {
-    if (window->scene_state != SCENE_LOADED ||
-        (!window->camera_changed && !window->scene_frame_changed && !window->image_changed))
-        return;
-    const FrameRequest request = {.camera = window->camera,
-                                  .follows_scene = cameras_equal(&window->camera, &window->scene.camera),
-                                  .scene_frame = window->scene_frame,
-                                  .size = window->size,
-                                  .view = window->view,
-                                  .precision = window->precision,
-                                  .is_moving = window->request > 0};
-    window->request = frame_loop_request(window->frames, &request);
-    if (window->image_changed) window->image_request = window->request;
-    window->camera_changed = window->scene_frame_changed = window->image_changed = false;
+    FrameRequest *wanted = &window->wanted;
+    if (window->scene.state != SCENE_LOADED || !request_is_due(window)) return;
+    wanted->follows_scene = cameras_equal(&wanted->camera, &window->scene.camera);
+    wanted->is_moving = window->request > 0;
+    window->request = frame_loop_request(window->frames, wanted);
+    if (is_other_image(wanted, &window->sent)) window->image_request = window->request;
+    window->sent = *wanted;
 }
 
 // Asks for the facts of the pixel under the cursor, if they are shown, and takes them.
 static void facts_exchange(Window *window)
 {
     const double *at = window->facts.at;
-    const bool is_inside =
-        at[0] >= 0 && at[1] >= 0 && at[0] < window->size.width && at[1] < window->size.height;
+    const ImageSize size = window->wanted.size;
+    const bool is_inside = at[0] >= 0 && at[1] >= 0 && at[0] < size.width && at[1] < size.height;
     if (window->facts.are_shown && window->facts.needs_probe && is_inside && window->request > 0) {
         frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
         window->facts.needs_probe = false;
@@ -67,11 +75,7 @@ static void size_read(Window *window)
 {
     int width = 1, height = 1;
     SDL_GetRendererOutputSize(window->screen.renderer, &width, &height);
-    const ImageSize size = {(uint32_t)width, (uint32_t)height};
-    if (width < 1 || height < 1 || (size.width == window->size.width && size.height == window->size.height))
-        return;
-    window->size = size;
-    window->image_changed = true;
+    if (width > 0 && height > 0) window->wanted.size = (ImageSize){(uint32_t)width, (uint32_t)height};
 }
 
 // Returns whether an event is about a scene and its camera, which do not exist until the scene is loaded.
@@ -92,7 +96,7 @@ static bool needs_scene(const SDL_Event *event)
 
 static void event_handle(Window *window, const SDL_Event *event)
 {
-    if (window->scene_state != SCENE_LOADED && needs_scene(event)) return;
+    if (window->scene.state != SCENE_LOADED && needs_scene(event)) return;
     switch (event->type) {
     case SDL_QUIT:
         window->closes = true;
@@ -142,34 +146,34 @@ static ImageSize window_size_fit(ImageSize size)
     return (ImageSize){(uint32_t)fmax(1, size.width * factor), (uint32_t)fmax(1, size.height * factor)};
 }
 
-// Receives the scene's state. Once it is loaded, the size is the scene's own unless another was asked for.
-static void scene_receive(Window *window)
+// Gives the window the size of the first scene's image, unless another was asked for.
+static void scene_size_set(Window *window)
 {
-    ImageSize size;
-    window->scene_state = frame_loop_scene(window->frames, &size);
-    if (window->scene_state != SCENE_LOADED || window->options->size.width > 0) return;
-    size = window_size_fit(size);
+    if (window->options->size.width > 0) return;
+    const ImageSize size = window_size_fit(window->scene.size);
     SDL_SetWindowSize(window->screen.window, (int)size.width, (int)size.height);
     size_read(window);
 }
 
 static void scene_acquire(Window *window)
 {
-    const bool follows = cameras_equal(&window->camera, &window->scene.camera);
-    const double frame_rate = window->scene.frame_rate;
-    if (!frame_loop_acquire_scene(window->frames, &window->scene)) return;
-    if (follows || window->scene.has_new_camera) window->camera = window->scene.camera;
-    window->camera_changed |= window->scene.has_new_camera;
+    const SceneUpdate old = window->scene, *scene = &window->scene;
+    FrameRequest *wanted = &window->wanted;
+    const bool follows = cameras_equal(&wanted->camera, &old.camera);
+    if (!frame_loop_acquire_scene(window->frames, &window->scene) || scene->state == SCENE_REFUSED) return;
+    if (old.state == SCENE_LOADING) scene_size_set(window);
+    if (follows || scene->has_new_camera) wanted->camera = scene->camera;
+    // the loop moves the camera of a request that follows the scene
+    if (window->sent.follows_scene && !scene->has_new_camera) window->sent.camera = scene->camera;
     window->play.is_running &= has_time_line(window);
-    if (window->scene_frame > 0 && window->scene_frame >= window->scene.frame_count)
-        scene_frame_show(window, (int64_t)window->scene.frame_count - 1);
-    if (window->scene.frame_rate != frame_rate)
-        scene_frame_show(window, window->scene_frame); // at the new rate from here
+    if (wanted->scene_frame > 0 && wanted->scene_frame >= scene->frame_count)
+        scene_frame_show(window, (int64_t)scene->frame_count - 1);
+    if (scene->frame_rate != old.frame_rate)
+        scene_frame_show(window, wanted->scene_frame); // at the new rate from here
 }
 
 static void work_exchange(Window *window)
 {
-    if (window->scene_state != SCENE_LOADED) scene_receive(window);
     scene_acquire(window);
     key_record(window);
     request_send(window);
@@ -195,7 +199,7 @@ static WindowEnd events_run(Window *window)
         if (window->mouse.drag == DRAG_LOOK) fly(window);
         if (window->play.is_running) play(window);
         work_exchange(window);
-        if (window->scene_state == SCENE_REFUSED) return WINDOW_REFUSED;
+        if (window->scene.state == SCENE_REFUSED) return WINDOW_REFUSED;
         if (window->redraws) window_draw(window);
     }
     return WINDOW_CLOSED;
@@ -240,7 +244,7 @@ static bool display_exists(void)
 // a display of many pixels per inch.
 static float text_scale(const Window *window, ImageSize size)
 {
-    const float pixels = (float)window->size.width / (float)size.width, usual_dpi = 96;
+    const float pixels = (float)window->wanted.size.width / (float)size.width, usual_dpi = 96;
     float dpi;
     if (pixels > 1 ||
         SDL_GetDisplayDPI(SDL_GetWindowDisplayIndex(window->screen.window), &dpi, NULL, NULL) != 0)
@@ -265,7 +269,7 @@ static bool window_open(Window *window)
     if (!screen->renderer) return false;
     size_read(window);
     screen->caption = caption_open(screen->renderer, text_scale(window, size));
-    window->precision = options->frames.settings.precision;
+    window->wanted.precision = options->frames.settings.precision;
     screen->frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
     frames.notify = frame_notify;

@@ -14,13 +14,15 @@ static const struct {
 
 static void title_set(const Window *window)
 {
-    const uint32_t count = window->view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
+    const uint32_t count =
+        window->wanted.view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
     Text title = {0};
     // ASCII: in the C locale SDL sets no other title
-    text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->view],
-                 precision_names[window->precision], window->size.width, window->size.height);
+    text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->wanted.view],
+                 precision_names[window->wanted.precision], window->wanted.size.width,
+                 window->wanted.size.height);
     if (has_time_line(window))
-        text_appendf(&title, ", frame %u of %u", window->scene_frame, window->scene.frame_count);
+        text_appendf(&title, ", frame %u of %u", window->wanted.scene_frame, window->scene.frame_count);
     if (!window->frame.pixels || window->frame.number < window->image_request)
         text_appendf(&title, ", preparing");
     else if (window->frame.samples < count)

@@ -13,8 +13,8 @@ static const double ARROW_ANGLE = 5 * M_PI / 180;
 
 static void arrow_turn(Window *window, double yaw, double pitch)
 {
-    camera_orbit(&window->camera, window->camera.look_at, yaw * ARROW_ANGLE, pitch * ARROW_ANGLE);
-    window->camera_changed = true;
+    Camera *camera = &window->wanted.camera;
+    camera_orbit(camera, camera->look_at, yaw * ARROW_ANGLE, pitch * ARROW_ANGLE);
 }
 
 // Writes the camera. With a `frame`, writes keys there.
@@ -22,8 +22,8 @@ static void camera_write(Window *window, const uint32_t *frame)
 {
     MessageList messages = {0};
     Text text = {0};
-    if (frame_loop_write_camera(window->frames, &window->camera, frame, &messages)) {
-        window->scene.camera = window->camera;
+    if (frame_loop_write_camera(window->frames, &window->wanted.camera, frame, &messages)) {
+        window->scene.camera = window->wanted.camera;
         text_appendf(&text, "camera written to %s", camera_path(&window->options->frames));
         if (frame) text_appendf(&text, " at frame %u", *frame);
         text_appendf(&text, "\n");
@@ -39,7 +39,8 @@ static void camera_write(Window *window, const uint32_t *frame)
 static void camera_print(Window *window)
 {
     Text yaml = {0};
-    camera_write_yaml(&yaml, &window->camera, (double)window->size.width / window->size.height);
+    const ImageSize size = window->wanted.size;
+    camera_write_yaml(&yaml, &window->wanted.camera, (double)size.width / size.height);
     fputs(text_c(&yaml), stdout);
     fflush(stdout);
     message_show(window, yaml.items);
@@ -60,16 +61,16 @@ static void key_ask(Window *window)
 
 void key_record(Window *window)
 {
-    if (!window->play.key_is_due || window->scene.frame != window->scene_frame) return;
+    if (!window->play.key_is_due || window->scene.frame != window->wanted.scene_frame) return;
     window->play.key_is_due = false;
-    camera_write(window, &window->scene_frame);
+    camera_write(window, &window->wanted.scene_frame);
 }
 
 // Asks for the image to be saved as SCENE-1.png, or with the first number that is free. An animation pauses,
 // since only a complete image is saved.
 static void save_ask(Window *window, const char *ending)
 {
-    if (window->view != VIEW_COLOR) {
+    if (window->wanted.view != VIEW_COLOR) {
         message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
         return;
     }
@@ -98,13 +99,6 @@ static void facts_toggle(Window *window)
     window->redraws = true;
 }
 
-// Shows the view that follows by `step`.
-static void view_show(Window *window, unsigned step)
-{
-    window->view = (View)((window->view + step) % VIEW_COUNT);
-    window->image_changed = true;
-}
-
 static void full_screen_toggle(const Window *window)
 {
     bool is_full = SDL_GetWindowFlags(window->screen.window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
@@ -115,6 +109,7 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
 {
     if (window->mouse.drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // keys fly the camera
     const bool has_shift = event->keysym.mod & KMOD_SHIFT;
+    FrameRequest *wanted = &window->wanted;
     message_show(window, NULL);
     switch (event->keysym.sym) {
     case SDLK_LEFT:
@@ -135,11 +130,10 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_COMMA:
     case SDLK_PERIOD:
         window->play.is_running = false;
-        scene_frame_show(window, window->scene_frame + (event->keysym.sym == SDLK_PERIOD ? INT64_C(1) : -1));
+        scene_frame_show(window, wanted->scene_frame + (event->keysym.sym == SDLK_PERIOD ? INT64_C(1) : -1));
         break;
     case SDLK_r:
-        window->camera = window->scene.camera;
-        window->camera_changed = true;
+        wanted->camera = window->scene.camera;
         break;
     case SDLK_c:
         camera_print(window);
@@ -154,14 +148,13 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
         full_screen_toggle(window);
         break;
     case SDLK_v:
-        view_show(window, has_shift ? VIEW_COUNT - 1 : 1);
+        wanted->view = (wanted->view + (has_shift ? VIEW_COUNT - 1 : 1)) % VIEW_COUNT;
         break;
     case SDLK_1:
     case SDLK_2:
     case SDLK_3:
     case SDLK_4:
-        window->precision = (Precision)(event->keysym.sym - SDLK_1);
-        window->image_changed = true;
+        wanted->precision = (Precision)(event->keysym.sym - SDLK_1);
         break;
     case SDLK_t:
         window->shows_times = !window->shows_times;

@@ -47,18 +47,12 @@ typedef struct {
     FrameLoop *frames;
     Screen screen;
 
-    // what is asked for
-    ImageSize size;       // in pixels, which a point of the window may have several of
-    Camera camera;        // follows the scene's own unless it was moved
-    uint32_t scene_frame; // the animation's frame of the last or the next request
-    View view;
-    Precision precision;
-    bool camera_changed, scene_frame_changed, image_changed;
-    unsigned request;       // the last one
-    unsigned image_request; // the last one for another view, precision or size
+    FrameRequest wanted;    // what is to be shown, by a camera that follows the scene's own until it is moved
+    FrameRequest sent;      // the last request, which is due again once it differs from `wanted`
+    unsigned request;       // its number, 0 before the first
+    unsigned image_request; // the number of the last one for another view, precision or size
 
     // what the loop has delivered
-    SceneState scene_state;
     SceneUpdate scene;
     Frame frame;
 
@@ -74,7 +68,9 @@ typedef struct {
 const char *scene_name(const Window *window);
 // Takes the message; NULL shows none.
 void message_show(Window *window, char *message);
-// Asks for an image if the last one asked for is not what should be shown.
+// Returns whether the last request is not for what is to be shown.
+bool request_is_due(const Window *window);
+// Sends a request if it is due.
 void request_send(Window *window);
 
 // window_mouse.c
