@@ -166,52 +166,35 @@ void verify_tangent_circle(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Pixels that are pending and those that were visited.
-typedef struct {
-    const Film *image;
-    uint32_t (*pending)[2]; // column, row
-    size_t pending_count;
-    bool *seen;
-} Flood;
-
-static bool flood_visit(Flood *flood, uint32_t column, uint32_t row)
+// Returns the pixel that stands for the part of the image to which a pixel belongs.
+static size_t part_of(size_t *parents, size_t pixel)
 {
-    size_t pixel = (size_t)row * flood->image->width + column;
-    if (flood->seen[pixel] || !verify_pixel_found(flood->image, pixel)) return false;
-    flood->seen[pixel] = true;
-    uint32_t *place = flood->pending[flood->pending_count++];
-    place[0] = column;
-    place[1] = row;
-    return true;
-}
-
-static void flood_run(Flood *flood)
-{
-    const Film *image = flood->image;
-    while (flood->pending_count > 0) {
-        const uint32_t *place = flood->pending[--flood->pending_count];
-        uint32_t column = place[0], row = place[1];
-        for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < image->height; y++)
-            for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < image->width; x++)
-                flood_visit(flood, x, y);
-    }
+    while (parents[pixel] != pixel)
+        pixel = parents[pixel] = parents[parents[pixel]];
+    return pixel;
 }
 
 // Returns the number of connected parts of the hit pixels. Pixels that touch at a corner are connected.
 static size_t count_parts(const Film *image)
 {
-    size_t parts = 0, pixels = film_pixel_count(image);
-    Flood flood = {image, memory_allocate(pixels, sizeof *flood.pending), 0,
-                   memory_allocate_zeroed(pixels, sizeof *flood.seen)};
-    for (uint32_t row = 0; row < image->height; row++)
-        for (uint32_t column = 0; column < image->width; column++) {
-            if (!flood_visit(&flood, column, row)) continue;
-            parts++;
-            flood_run(&flood);
-        }
-    free(flood.pending);
-    free(flood.seen);
-    return parts;
+    size_t *parents = memory_allocate(film_pixel_count(image), sizeof *parents), count = 0;
+    for (size_t pixel = 0; pixel < film_pixel_count(image); pixel++) {
+        const size_t column = pixel % image->width, row = pixel / image->width;
+        parents[pixel] = pixel;
+        if (!verify_pixel_found(image, pixel)) continue;
+        count++;
+        // those around it that come before it
+        for (size_t y = row > 0 ? row - 1 : 0; y <= row; y++)
+            for (size_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < image->width; x++) {
+                const size_t other = y * image->width + x;
+                if (other >= pixel || !verify_pixel_found(image, other)) continue;
+                const size_t part = part_of(parents, other);
+                count -= part != part_of(parents, pixel);
+                parents[part] = part_of(parents, pixel);
+            }
+    }
+    free(parents);
+    return count;
 }
 
 // Checks a ring. At 30 degrees it is half a pixel thick, so the exact image has gaps. In the second image it
