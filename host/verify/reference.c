@@ -7,9 +7,8 @@
 SHAPE_LIST(SHAPE_DECLARE)
 #undef SHAPE_DECLARE
 
-// Indexed by ShapeType, which follows SHAPE_LIST. A mesh is tested as its triangles.
 #define SHAPE_ROW(feature, Type, name, names) &reference_##name,
-static const ReferenceShape *const shapes[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)};
+const ReferenceShape *const reference_shapes[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)};
 #undef SHAPE_ROW
 
 ReferenceRay reference_ray(Vector3 origin, Vector3 direction)
@@ -60,7 +59,7 @@ Object reference_round_object(const Object *object)
     Vector3 *points = (Vector3 *)(void *)&result.as, end = vector_add(points[0], points[1]);
     bool finite = (object->type == SHAPE_CYLINDER && object->as.cylinder.finite) ||
                   (object->type == SHAPE_CONE && object->as.cone.finite);
-    round_numbers(&points[0].x, shapes[object->type]->number_count);
+    round_numbers(&points[0].x, reference_shapes[object->type]->number_count);
     round_numbers(&end.x, 3);
     if (finite) points[1] = vector_subtract(end, points[0]);
     return result;
@@ -70,7 +69,7 @@ Object reference_object_from(const Object *object, Vector3 eye)
 {
     Object result = *object;
     Vector3 *points = (Vector3 *)(void *)&result.as;
-    for (unsigned i = 0; i < shapes[object->type]->point_count; i++)
+    for (unsigned i = 0; i < reference_shapes[object->type]->point_count; i++)
         points[i] = vector_subtract(points[i], eye);
     return result;
 }
@@ -80,7 +79,7 @@ void reference_grow_object(Object *object, const Object *start, const Object *gr
     const double *from = (const double *)(const void *)&start->as,
                  *rate = (const double *)(const void *)&growth->as;
     double *numbers = (double *)(void *)&object->as;
-    for (unsigned i = 0; i < shapes[start->type]->number_count; i++)
+    for (unsigned i = 0; i < reference_shapes[start->type]->number_count; i++)
         numbers[i] = from[i] + size * rate[i];
 }
 
@@ -92,7 +91,7 @@ ReferenceHit reference_miss(void)
 static ReferenceHit hit_from(const Object *object, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_miss();
-    shapes[object->type]->hit(object, ray, &hit);
+    reference_shapes[object->type]->hit(object, ray, &hit);
     return hit;
 }
 
@@ -133,7 +132,7 @@ ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
 ReferenceSurface reference_surface(const Object *object, Quad3 point)
 {
     ReferenceSurface surface = {.normal_condition = 1};
-    shapes[object->type]->surface(object, point, &surface);
+    reference_shapes[object->type]->surface(object, point, &surface);
     return surface;
 }
 

@@ -12,6 +12,9 @@ typedef struct {
     unsigned point_count, number_count;
 } ReferenceShape;
 
+// Indexed by ShapeType, which follows SHAPE_LIST. A mesh is tested as its triangles.
+extern const ReferenceShape *const reference_shapes[];
+
 #define UNBOUNDED ((Quad)LDBL_MAX)
 
 // Records the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.

@@ -2,15 +2,6 @@
 #include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
-extern const ReferenceShape reference_sphere, reference_disc, reference_cylinder, reference_cone,
-    reference_torus, reference_paraboloid;
-
-static const ReferenceShape *const units[SHAPE_OVAL] = {
-    [SHAPE_SPHERE] = &reference_sphere,     [SHAPE_DISC] = &reference_disc,
-    [SHAPE_CYLINDER] = &reference_cylinder, [SHAPE_CONE] = &reference_cone,
-    [SHAPE_TORUS] = &reference_torus,       [SHAPE_PARABOLOID] = &reference_paraboloid,
-};
-
 // The rows of the inverse of the map, by Cramer's rule, and a bound on its norm.
 typedef struct {
     Quad3 rows[3];
@@ -52,7 +43,7 @@ static void hit_oval(const Object *object, const ReferenceRay *ray, ReferenceHit
     const Quad3 from = quad3_subtract(ray->origin, quad3(object->as.oval.center));
     const ReferenceRay unit_ray = {axes_coordinates(inverse.rows, from),
                                    axes_coordinates(inverse.rows, ray->direction), ray->tmin, ray->tmax};
-    units[unit.type]->hit(&unit, &unit_ray, hit);
+    reference_shapes[unit.type]->hit(&unit, &unit_ray, hit);
     hit->margin = hit->margin == UNBOUNDED ? UNBOUNDED : hit->margin / inverse.norm;
     if (!hit->found) return;
     Quad length;
@@ -66,7 +57,7 @@ static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *su
 {
     const Inverse inverse = inverse_of(object);
     const Object unit = oval_unit(object);
-    units[unit.type]->surface(
+    reference_shapes[unit.type]->surface(
         &unit, axes_coordinates(inverse.rows, quad3_subtract(point, quad3(object->as.oval.center))), surface);
     Quad squares = 0;
     for (int i = 0; i < 3; i++)
