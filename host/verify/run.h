@@ -18,38 +18,15 @@ typedef struct {
 // The checks of a case that are not in the tables. Each counts its faults in the run's result.
 typedef void VerifyCheck(VerifyRun *run);
 
-VerifyCheck verify_scaled_directions; // S6
-VerifyCheck verify_leaving_spheres;   // S6
-VerifyCheck verify_points_on_faces;   // P5
-VerifyCheck verify_coincident_faces;  // P7
-VerifyCheck verify_far_mesh;          // M2
-VerifyCheck verify_scale_ladder;      // M3
-VerifyCheck verify_within_triangle;   // M4
-VerifyCheck verify_facing_triangle;   // M4
-VerifyCheck verify_degenerate_meshes; // M5
-VerifyCheck verify_bvh;               // M6
-VerifyCheck verify_instances;         // M8
-VerifyCheck verify_critical_angle;    // R4
-VerifyCheck verify_camera_frames;     // R8
-
-VerifyCheck verify_far_fringe;       // S2
-VerifyCheck verify_ground_horizon;   // S4
-VerifyCheck verify_sizes;            // S7, P8, C8, T7, Q4, M7: the shapes of the case
-VerifyCheck verify_plane_horizon;    // P1
-VerifyCheck verify_plane_acne;       // P2
-VerifyCheck verify_thin_plate;       // P6
-VerifyCheck verify_wire;             // C3
-VerifyCheck verify_apex;             // C6
-VerifyCheck verify_far_torus;        // T1
-VerifyCheck verify_tangent_circle;   // T4
-VerifyCheck verify_thin_ring;        // T5
-VerifyCheck verify_contact_shadow;   // R1
-VerifyCheck verify_nested_spheres;   // R2
-VerifyCheck verify_matched_glass;    // R3
-VerifyCheck verify_highlights;       // R5
-VerifyCheck verify_scaled_scenes;    // R6
-VerifyCheck verify_mirrored_scenes;  // R7
-VerifyCheck verify_degenerate_views; // R8
+// of rays, and of cameras
+VerifyCheck verify_scaled_directions, verify_leaving_spheres, verify_points_on_faces, verify_coincident_faces,
+    verify_far_mesh, verify_scale_ladder, verify_within_triangle, verify_facing_triangle,
+    verify_degenerate_meshes, verify_bvh, verify_instances, verify_critical_angle, verify_camera_frames;
+// of images
+VerifyCheck verify_far_fringe, verify_wire, verify_apex, verify_far_torus, verify_tangent_circle,
+    verify_thin_ring, verify_ground_horizon, verify_plane_horizon, verify_sizes, verify_plane_acne,
+    verify_thin_plate, verify_contact_shadow, verify_nested_spheres, verify_matched_glass, verify_highlights,
+    verify_scaled_scenes, verify_mirrored_scenes, verify_degenerate_views;
 
 static inline bool verify_is_double(const VerifyRun *run)
 {
