@@ -13,6 +13,7 @@
 #include "host/cli/report_json.h"
 #include "host/cli/verify_journal.h"
 #include "host/render/arithmetic.h"
+#include "host/scene/quad.h"
 #include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
@@ -241,11 +242,11 @@ static void precision_verify(Verification *verification, Compute *compute)
     verification->tier = (char)('A' + tier);
     if (!record->is_started) {
         record->start_seconds = clock_seconds();
-        if (tier == TIER_D && verify_reference_bits() < 64)
+        if (tier == TIER_D && QUAD_BITS < 64)
             fprintf(stderr,
                     "glint: verify: the reference has %d bits here: tier D is checked against numbers of the "
                     "precision that it tests\n",
-                    verify_reference_bits());
+                    QUAD_BITS);
         text_print(verification, "%s\n", precision_names[verification->precision]);
         record->is_started = true;
     }
@@ -287,7 +288,7 @@ static Json *journal_json(const Verification *verification)
 {
     const VerifyOptions *options = verification->options;
     Json *json = report_json_open(3, verification->compute->device);
-    json_addf(json, "reference_bits %u quick %d", (unsigned)verify_reference_bits(), options->quick);
+    json_addf(json, "reference_bits %u quick %d", (unsigned)QUAD_BITS, options->quick);
     perturb_json(json, options->common.settings.perturb_seed, options->common.settings.perturb_scale);
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
@@ -326,8 +327,8 @@ static int device_verify(Verification *verification, Compute *compute)
         !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
     if (!journal->is_headed)
-        text_print(verification, "%s; reference of %d bits%s\n", compute->device->name,
-                   verify_reference_bits(), options->quick ? "; quick" : "");
+        text_print(verification, "%s; reference of %d bits%s\n", compute->device->name, QUAD_BITS,
+                   options->quick ? "; quick" : "");
     journal->is_headed = true;
     verification->row_count = verification->case_count * (size_t)(last - first + 1);
     size_t failed = 0;

@@ -6,11 +6,6 @@
 
 // The factors of u and ulp below are those of docs/verify.md, tiers B to D.
 
-int verify_reference_bits(void)
-{
-    return QUAD_BITS;
-}
-
 static Object object_at_work(const VerifyRun *run, const Object *object)
 {
     return verify_is_double(run) ? *object : reference_round_object(object);

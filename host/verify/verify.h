@@ -68,9 +68,6 @@ enum { VERIFY_CASES_MAX = 64 };
 // Returns the names in the order in which the cases run, and NULL past the last.
 const char *verify_case_name(size_t i);
 
-// Returns the bits of the reference's numbers: 113, or those of long double if the compiler has no more.
-int verify_reference_bits(void);
-
 // Runs the cases in turn until the sink stops it, and keeps *kernels up to date.
 void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
                 const VerifySink *sink, VerifyKernels *kernels);
