@@ -516,7 +516,7 @@ TEST(hard_cases_are_decided)
     const VerifySettings settings = {
         .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
     VerifyKernels kernels = {0};
-    verify_run(&probe_compute, &settings, NULL, &(VerifySink){.receive = case_print}, &kernels);
+    verify_run(&probe_compute, &settings, &(VerifySink){.receive = case_print}, &kernels);
     print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not uncertified\n",
                   pictures.images, pictures.compared, pictures.wrong, pictures.wrong_decided);
     assert_true(pictures.images > 100);

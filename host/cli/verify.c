@@ -201,6 +201,7 @@ static bool case_start(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
     CaseRecord *record = &verification->record->cases[case_index(result->name)];
+    if (!is_chosen(verification->options, result->name)) return false;
     if (record->state == CASE_CRASHED && !record->is_printed) record_print(verification, record);
     if (has_ended(record)) return false;
     *record = (CaseRecord){.state = CASE_RUNNING, .result = *result, .start_seconds = clock_seconds()};
@@ -250,9 +251,8 @@ static void precision_verify(Verification *verification, Compute *compute)
         text_print(verification, "%s\n", precision_names[verification->precision]);
         record->is_started = true;
     }
-    const VerifyChoice choice = {options->names.items, options->names.count};
     const VerifySink sink = {case_start, case_receive, verification};
-    verify_run(compute, &settings, choice.count > 0 ? &choice : NULL, &sink, &record->kernels);
+    verify_run(compute, &settings, &sink, &record->kernels);
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
     record->is_ended = true;
@@ -358,6 +358,12 @@ static int verification_work(void *context)
     return device_close(&open, device_verify(verification, &open.compute));
 }
 
+static bool needs_all_kernels(void *context, const VerifyResult *result)
+{
+    (void)context;
+    return strcmp(result->name, "P6") == 0;
+}
+
 static bool result_discard(void *context, const VerifyResult *result)
 {
     (void)context, (void)result;
@@ -369,10 +375,7 @@ static bool result_discard(void *context, const VerifyResult *result)
 // made before.
 static void builder_start(const VerifyOptions *options)
 {
-    static char name[] = "P6";
-    char *const names[] = {name};
-    const VerifyChoice choice = {names, 1};
-    const VerifySink sink = {.receive = result_discard};
+    const VerifySink sink = {.start = needs_all_kernels, .receive = result_discard};
     const pid_t parent = getpid();
     fflush(stdout); // otherwise each process would print the contents of the buffer
     if (fork() != 0) return;
@@ -384,7 +387,7 @@ static void builder_start(const VerifyOptions *options)
     for (Precision precision = PRECISION_STRICT; precision <= last; precision++) {
         const VerifySettings settings = {.render = precision_settings(options, precision), .quick = true};
         VerifyKernels kernels = {0};
-        verify_run(&open.compute, &settings, &choice, &sink, &kernels);
+        verify_run(&open.compute, &settings, &sink, &kernels);
     }
     _exit(EXIT_DONE);
 }

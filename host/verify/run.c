@@ -173,8 +173,8 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *
                   TraceHit *hits)
 {
     const RenderSettings settings = scene_settings(run, bvh, 0, 0);
-    scene_assign(run, run->tracer, scene, &settings);
-    verify_trace_opened(run, *run->tracer, rays, count, hits);
+    scene_assign(run, &run->tracer, scene, &settings);
+    verify_trace_opened(run, run->tracer, rays, count, hits);
 }
 
 static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
@@ -194,9 +194,9 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
     Film film;
     const RenderSettings settings = scene_settings(run, bvh, width, height);
     if (run->settings->picture) run->settings->picture(run->settings->context, scene, &settings);
-    scene_assign(run, run->painter, scene, &settings);
-    if (*run->painter && renderer_render_film(*run->painter, aovs, &film))
-        run->kernels->render_hash = renderer_report(*run->painter)->kernel_hash;
+    scene_assign(run, &run->painter, scene, &settings);
+    if (run->painter && renderer_render_film(run->painter, aovs, &film))
+        run->kernels->render_hash = renderer_report(run->painter)->kernel_hash;
     else
         film = film_allocate(width, height, (uint32_t)scene->lights.count, aovs);
     const size_t pixels = film_pixel_count(&film);

@@ -12,7 +12,7 @@ typedef struct {
     VerifyKernels *kernels;
     // The renderers of the last scenes of verify_trace and verify_render, or NULL. The next scene reuses
     // them with their kernels, because loading kernels takes longer than most scenes.
-    Renderer **tracer, **painter;
+    Renderer *tracer, *painter;
 } VerifyRun;
 
 // The checks of a case that are not in the tables. Each counts its faults in the run's result.

@@ -78,13 +78,6 @@ const char *verify_case_name(size_t i)
     return i < COUNT_OF(cases) ? cases[i].name : NULL;
 }
 
-static bool is_chosen(const VerifyChoice *choice, const char *name)
-{
-    for (size_t i = 0; choice && i < choice->count; i++)
-        if (strcmp(choice->names[i], name) == 0) return true;
-    return !choice;
-}
-
 // Returns whether quotients and roots err as much as OpenCL C allows.
 static bool is_inexact(const RenderSettings *settings)
 {
@@ -101,28 +94,25 @@ VerifyTier verify_tier(const RenderSettings *settings)
     return is_inexact(settings) ? TIER_A : tiers[settings->precision];
 }
 
-void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
-                const VerifySink *sink, VerifyKernels *kernels)
+void verify_run(Compute *compute, const VerifySettings *settings, const VerifySink *sink,
+                VerifyKernels *kernels)
 {
-    Renderer *tracer = NULL, *painter = NULL;
+    VerifyResult result;
+    VerifyRun run = {.compute = compute,
+                     .settings = settings,
+                     .tier = verify_tier(&settings->render),
+                     .inexact = is_inexact(&settings->render),
+                     .result = &result,
+                     .kernels = kernels};
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        if (!is_chosen(choice, cases[i].name)) continue;
-        VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = HASH_START};
+        result = (VerifyResult){.name = cases[i].name, .title = cases[i].title, .hash = HASH_START};
         if (sink->start && !sink->start(sink->context, &result)) continue;
-        VerifyRun run = {.compute = compute,
-                         .settings = settings,
-                         .tier = verify_tier(&settings->render),
-                         .inexact = is_inexact(&settings->render),
-                         .result = &result,
-                         .kernels = kernels,
-                         .tracer = &tracer,
-                         .painter = &painter};
         for (size_t k = 0; k < verify_rays_count; k++)
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
         if (!sink->receive(sink->context, &result)) break;
     }
-    renderer_close(tracer);
-    renderer_close(painter);
+    renderer_close(run.tracer);
+    renderer_close(run.painter);
 }

@@ -58,16 +58,10 @@ typedef struct {
     void *context;
 } VerifySink;
 
-// The names of the cases to run, or NULL for all.
-typedef struct {
-    char *const *names;
-    size_t count;
-} VerifyChoice;
-
 enum { VERIFY_CASES_MAX = 64 };
 // Returns the names in the order in which the cases run, and NULL past the last.
 const char *verify_case_name(size_t i);
 
 // Runs the cases in turn until the sink stops it, and keeps *kernels up to date.
-void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
-                const VerifySink *sink, VerifyKernels *kernels);
+void verify_run(Compute *compute, const VerifySettings *settings, const VerifySink *sink,
+                VerifyKernels *kernels);
