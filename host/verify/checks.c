@@ -1,6 +1,5 @@
 #include "host/verify/checks.h"
 
-#include "host/base/memory.h"
 #include <math.h>
 #include <string.h>
 
@@ -26,9 +25,9 @@ VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 e
     return target_from(&seen, origin);
 }
 
-Object *verify_objects(const VerifyRun *run, const Scene *scene)
+Object *verify_objects(VerifyRun *run, const Scene *scene)
 {
-    Object *objects = memory_allocate(scene->objects.count, sizeof *objects);
+    Object *objects = verify_allocate(run, scene->objects.count, sizeof *objects);
     for (size_t i = 0; i < scene->objects.count; i++)
         objects[i] = object_at_work(run, &scene->objects.items[i]);
     return objects;

@@ -20,8 +20,8 @@ ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, siz
 // Checks hit or miss and the distance at a pixel of an image of the target alone. Returns the exact hit.
 ReferenceHit verify_check_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel);
 
-// Returns the objects of a scene rounded to the precision at work. The caller frees them.
-Object *verify_objects(const VerifyRun *run, const Scene *scene);
+// Returns the objects of a scene rounded to the precision at work, for the duration of the case.
+Object *verify_objects(VerifyRun *run, const Scene *scene);
 ReferenceRay verify_reference_ray(const TraceRay *ray);
 
 // Returns whether the ray must hit or miss exactly as the reference does, however near the boundary.

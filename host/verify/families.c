@@ -158,14 +158,6 @@ TraceRay family_beside_sliver(uint64_t i)
     return ray_along(vector_add(vector_scale(direction, -100), target), direction);
 }
 
-Scene scene_empty(void)
-{
-    Scene scene = {.camera = {.look_at = {0, 0, 1}, .half_tangent = 1}};
-    Material material = material_default();
-    scene_add_material(&scene, &material, "");
-    return scene;
-}
-
 void scene_add_triangle(Scene *scene, const Vector3 vertices[3])
 {
     Object object = {.type = SHAPE_TRIANGLE};

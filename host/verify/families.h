@@ -24,8 +24,6 @@ TraceRay family_across_torus(uint64_t index);     // T3
 TraceRay family_beside_sliver(uint64_t index);    // M4
 TraceRay family_from_within(uint64_t index);      // M1
 
-// Returns a scene with a camera, one material and no objects.
-Scene scene_empty(void);
 void scene_add_triangle(Scene *scene, const Vector3 vertices[3]);
 void scene_triangle_room(Scene *scene); // the cube from -1 to 1
 void scene_icosphere(Scene *scene);     // 20480 triangles, radii off by up to 20 %

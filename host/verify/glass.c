@@ -1,6 +1,5 @@
 // Images and rays through glass.
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
 #include <math.h>
@@ -25,17 +24,18 @@ void verify_nested_spheres(VerifyRun *run)
     const uint32_t expected = passed_path(sphere_then_coat, 2);
     for (size_t k = 0; k < 6; k++) {
         double scale = scales[k % 3], ratio = ratios[k / 3];
-        Scene scene = verify_scene("ambient: [1, 1, 1]\n"
-                                   "materials:\n  red: {color: [1, 0, 0]}\n"
-                                   "  glass: {transmission: 1, ior: 1.5, diffuse: 0, ambient: 0}\n"
-                                   "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: red}\n"
-                                   "  - sphere: {center: [0, 0, 0], radius: 1, material: glass}\n");
-        scene.objects.items[0].as.sphere.radius = scale;
-        scene.objects.items[1].as.sphere.radius = scale * ratio;
+        Scene *scene =
+            verify_scene(run, "ambient: [1, 1, 1]\n"
+                              "materials:\n  red: {color: [1, 0, 0]}\n"
+                              "  glass: {transmission: 1, ior: 1.5, diffuse: 0, ambient: 0}\n"
+                              "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: red}\n"
+                              "  - sphere: {center: [0, 0, 0], radius: 1, material: glass}\n");
+        scene->objects.items[0].as.sphere.radius = scale;
+        scene->objects.items[1].as.sphere.radius = scale * ratio;
         const Vector3 eye = {1.5 * scale, 2 * scale, 2.5 * scale}, center = {0, 0, 0};
-        scene.camera = verify_camera(eye, center, 40);
-        Film image = verify_render(run, &scene, false, 192, 192);
-        VerifyTarget coat = verify_target(run, &scene.objects.items[1], eye);
+        scene->camera = verify_camera(eye, center, 40);
+        Film image = verify_render(run, scene, false, 192, 192);
+        VerifyTarget coat = verify_target(run, &scene->objects.items[1], eye);
         size_t seen = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             if (image.object[i] != 1) {
@@ -49,22 +49,21 @@ void verify_nested_spheres(VerifyRun *run)
             run->result->wrong += image.path[i] != expected;
         }
         run->result->wrong += seen == 0;
-        film_free(&image);
-        scene_free(&scene);
     }
 }
 
-static Scene matched_scene(const char *object)
+static Scene *matched_scene(VerifyRun *run, const char *object)
 {
-    Scene scene =
-        verify_scene("background: [0.2, 0.3, 0.4]\nambient: [0.1, 0.1, 0.1]\n"
+    Scene *scene =
+        verify_scene(run,
+                     "background: [0.2, 0.3, 0.4]\nambient: [0.1, 0.1, 0.1]\n"
                      "lights:\n  - point: {position: [-3, 4, -6]}\n"
                      "materials:\n  tiles: {checker: {colors: [[1, 1, 1], [0.1, 0.1, 0.1]], size: 0.5}}\n"
                      "  glass: {transmission: 1, ior: 1, diffuse: 0, ambient: 0}\n"
                      "objects:\n  - plane: {point: [0, 0, 5], normal: [0, 0, -1], material: tiles}\n%s",
                      object);
     const Vector3 eye = {0, 0, -5}, ahead = {0, 0, 5};
-    scene.camera = verify_camera(eye, ahead, 30);
+    scene->camera = verify_camera(eye, ahead, 30);
     return scene;
 }
 
@@ -88,16 +87,18 @@ static double edge_distance(const Film *empty, size_t pixel)
 static void check_straight_rays(VerifyRun *run, const char *object, unsigned seed)
 {
     enum { COUNT = 20000 };
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays), *inner = memory_allocate(COUNT, sizeof *inner);
-    TraceHit *first = memory_allocate(COUNT, sizeof *first), *second = memory_allocate(COUNT, sizeof *second);
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays),
+             *inner = verify_allocate(run, COUNT, sizeof *inner);
+    TraceHit *first = verify_allocate(run, COUNT, sizeof *first),
+             *second = verify_allocate(run, COUNT, sizeof *second);
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 from = vector_scale(random_unit(seed, i, 0), 4);
         Vector3 at = vector_scale(random_unit(seed, i, 3), random_at(seed, i, 6));
         rays[i] = verify_ray(run, from, vector_normalize(vector_subtract(at, from)));
     }
-    Scene scene = matched_scene(object);
-    scene.objects.items[0].as.plane.point.z = 1e6; // out of the way
-    Renderer *opened = verify_open(run, &scene, false);
+    Scene *scene = matched_scene(run, object);
+    scene->objects.items[0].as.plane.point.z = 1e6; // out of the way
+    Renderer *opened = verify_open(run, scene, false);
     verify_trace_opened(run, opened, rays, COUNT, first);
     for (size_t i = 0; i < COUNT; i++) {
         inner[i] = rays[i];
@@ -106,7 +107,6 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     }
     verify_trace_opened(run, opened, inner, COUNT, second);
     renderer_close(opened);
-    scene_free(&scene);
     size_t entered = 0;
     for (size_t i = 0; i < COUNT; i++) {
         if (first[i].object != 1) continue;
@@ -125,22 +125,16 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     }
     // most of the targets lie within the body
     run->result->wrong += entered < COUNT / 2;
-    free(rays);
-    free(inner);
-    free(first);
-    free(second);
 }
 
 // Checks that glass of index 1 is invisible.
 void verify_matched_glass(VerifyRun *run)
 {
-    Scene without = matched_scene("");
-    Film empty = verify_render(run, &without, false, 256, 256);
-    scene_free(&without);
+    Scene *without = matched_scene(run, "");
+    Film empty = verify_render(run, without, false, 256, 256);
     for (unsigned k = 0; k < COUNT_OF(matched); k++) {
-        Scene scene = matched_scene(matched[k]);
-        Film image = verify_render(run, &scene, false, 256, 256);
-        scene_free(&scene);
+        Scene *scene = matched_scene(run, matched[k]);
+        Film image = verify_render(run, scene, false, 256, 256);
         size_t through = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             through += image.object[i] == 1;
@@ -149,8 +143,6 @@ void verify_matched_glass(VerifyRun *run)
                 verify_record(run, fabs(image.color[c] - empty.color[c]), 1e-5, "of 1");
         }
         run->result->wrong += through == 0;
-        film_free(&image);
         check_straight_rays(run, matched[k], 71 + k);
     }
-    film_free(&empty);
 }

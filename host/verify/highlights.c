@@ -22,21 +22,22 @@ void verify_highlights(VerifyRun *run)
     for (size_t k = 0; k < 16; k++) {
         double power = powers[k / 2];
         bool closely = k % 2;
-        Scene scene =
-            verify_scene("lights:\n  - directional: {direction: [0, 0, 1]}\n"
+        Scene *scene =
+            verify_scene(run,
+                         "lights:\n  - directional: {direction: [0, 0, 1]}\n"
                          "materials:\n  shiny: {diffuse: 0, specular: 1, ambient: 0, shininess: %.17g}\n"
                          "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
                          power);
         // the whole sphere is lit from the side and partly behind, the close-up from next to the eye
         Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
-        scene.lights.items[0].direction = direction;
+        scene->lights.items[0].direction = direction;
         const Vector3 center = {0, 0, 0};
-        scene.camera = verify_camera(eye, center, 30);
+        scene->camera = verify_camera(eye, center, 30);
         if (closely) {
-            scene.camera.look_at = highlight_middle(eye, vector_scale(direction, -1));
-            scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
+            scene->camera.look_at = highlight_middle(eye, vector_scale(direction, -1));
+            scene->camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
         }
-        Film image = verify_render(run, &scene, false, 96, 96);
+        Film image = verify_render(run, scene, false, 96, 96);
         Quad3 to_light = quad3_unit(quad3(verify_rounded_vector(run, vector_scale(direction, -1))));
         size_t seen = 0;
         double brightest = 0;
@@ -56,7 +57,5 @@ void verify_highlights(VerifyRun *run)
         }
         // in the close-up the highlight is in the middle of the image
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);
-        film_free(&image);
-        scene_free(&scene);
     }
 }

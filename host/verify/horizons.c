@@ -22,12 +22,12 @@ void verify_ground_horizon(VerifyRun *run)
         double fov;  // in degrees
         double rise; // slope of the view direction; the horizon's is -sqrt(2e-6)
     } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
-    Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
+    Scene *scene = verify_scene(run, "objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
     const Vector3 eye = {0, 1, 0};
     for (size_t k = 0; k < COUNT_OF(views); k++) {
-        scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
-        Film image = verify_render(run, &scene, false, 128, 512);
-        VerifyTarget ground = verify_target(run, &scene.objects.items[0], eye);
+        scene->camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
+        Film image = verify_render(run, scene, false, 128, 512);
+        VerifyTarget ground = verify_target(run, &scene->objects.items[0], eye);
         for (uint32_t column = 0; column < image.width; column++) {
             uint32_t horizon = column_horizon(run, &image, column), exact = image.height;
             for (uint32_t row = image.height - 1; row > horizon; row--) {
@@ -41,23 +41,19 @@ void verify_ground_horizon(VerifyRun *run)
             }
             verify_record(run, fabs((double)horizon - (double)exact), 1, "rows");
         }
-        film_free(&image);
     }
-    scene_free(&scene);
 }
 
 // Checks that a plane seen horizontally ends at the image's middle in every column, whether the middle lies
 // on a row of pixels or between two.
 void verify_plane_horizon(VerifyRun *run)
 {
-    Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
+    Scene *scene = verify_scene(run, "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
     const Vector3 eye = {0, 1.7, 0}, ahead = {0, 1.7, 1};
-    scene.camera = verify_camera(eye, ahead, 60);
+    scene->camera = verify_camera(eye, ahead, 60);
     for (uint32_t height = 511; height <= 512; height++) {
-        Film image = verify_render(run, &scene, false, 512, height);
+        Film image = verify_render(run, scene, false, 512, height);
         for (uint32_t column = 0; column < image.width; column++)
             run->result->wrong += column_horizon(run, &image, column) != (height + 1) / 2;
-        film_free(&image);
     }
-    scene_free(&scene);
 }

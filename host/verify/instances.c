@@ -82,14 +82,13 @@ void verify_instances(VerifyRun *run)
         {mirror_and_shear, 2},
         {affine_of_steps(vector_all(1e-6), (Vector3){70, -20, 10}, (Vector3){3e-6, 1e-6, 0}), 1.25e-6},
     };
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
-    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
     for (size_t which = 0; which < COUNT_OF(placed); which++) {
-        Scene scene = scene_empty();
+        Scene *scene = verify_empty_scene(run);
         const Mesh mesh = ball_make();
-        array_push(scene.meshes, mesh);
+        array_push(scene->meshes, mesh);
         const Material material = material_default();
-        scene_add_object(&scene,
+        scene_add_object(scene,
                          (Object){.type = SHAPE_MESH,
                                   .as.mesh = {.is_instance = true, .transform = placed[which].transform}},
                          &material);
@@ -99,15 +98,12 @@ void verify_instances(VerifyRun *run)
                                  random_unit(73, which * COUNT + i, 3));
         }
         for (int bounce = 0; bounce < 3; bounce++) {
-            verify_trace(run, &scene, true, rays, COUNT, hits);
+            const TraceHit *hits = verify_trace(run, scene, true, rays, COUNT);
             for (size_t i = 0; i < COUNT; i++) {
-                check_hit(run, &scene, &rays[i], &hits[i], placed[which].size);
+                check_hit(run, scene, &rays[i], &hits[i], placed[which].size);
                 if (verify_is_hit(&hits[i]))
                     rays[i] = verify_ray(run, hits[i].reflected_origin, hits[i].reflected_direction);
             }
         }
-        scene_free(&scene);
     }
-    free(rays);
-    free(hits);
 }

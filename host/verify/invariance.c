@@ -42,12 +42,12 @@ static const char every_shape[] =
     "  - torus:    {center: [3.3, -2.6, 7.5], axis: [0.3, 1, -0.4], major: 0.6, minor: 0.22, "
     "material: matt}\n";
 
-static Scene every_shape_scene(void)
+static Scene *every_shape_scene(VerifyRun *run)
 {
-    Scene scene = verify_scene("%s", every_shape);
+    Scene *scene = verify_scene(run, "%s", every_shape);
     const Vector3 eye = {0, 0, 0}, middle = {-0.5, -2, 10};
-    scene.camera = verify_camera(eye, middle, 40);
-    scene.camera.up = (Vector3){0.1, 1, 0};
+    scene->camera = verify_camera(eye, middle, 40);
+    scene->camera.up = (Vector3){0.1, 1, 0};
     return scene;
 }
 
@@ -98,20 +98,16 @@ static void compare(VerifyRun *run, const Film *a, const View *view)
 void verify_scaled_scenes(VerifyRun *run)
 {
     static const int exponents[] = {-20, -10, -3, 3, 10, 20};
-    Scene scene = every_shape_scene();
-    Film image = verify_render(run, &scene, false, 160, 120);
-    demand_every_object(run, &scene, &image);
-    scene_free(&scene);
+    Scene *scene = every_shape_scene(run);
+    Film image = verify_render(run, scene, false, 160, 120);
+    demand_every_object(run, scene, &image);
     for (size_t i = 0; i < COUNT_OF(exponents); i++) {
         double scale = ldexp(1, exponents[i]);
-        Scene scaled = every_shape_scene();
-        scene_scale(&scaled, scale);
-        Film other = verify_render(run, &scaled, i % 2, 160, 120);
+        Scene *scaled = every_shape_scene(run);
+        scene_scale(scaled, scale);
+        Film other = verify_render(run, scaled, i % 2, 160, 120);
         compare(run, &image, &(View){&other, scale, false});
-        film_free(&other);
-        scene_free(&scaled);
     }
-    film_free(&image);
 }
 
 // Returns whether a ray, or one turned by a few roundings, hits the object.
@@ -166,23 +162,23 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
 }
 
 // Returns the scene without checkers: an edge of squares belongs to one, and in the mirror to the other.
-static Scene unchecked_scene(void)
+static Scene *unchecked_scene(VerifyRun *run)
 {
-    Scene scene = every_shape_scene();
-    for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].checker.is_on = false;
+    Scene *scene = every_shape_scene(run);
+    for (size_t i = 0; i < scene->materials.count; i++)
+        scene->materials.items[i].checker.is_on = false;
     return scene;
 }
 
 // Returns the scene without checkers, without mirrors and glass, which magnify roundings, and without the
 // tip of a cone, around which the normal turns by the point's error over its distance from the tip.
-static Scene plain_scene(void)
+static Scene *plain_scene(VerifyRun *run)
 {
-    Scene scene = unchecked_scene();
-    for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].reflection = scene.materials.items[i].transmission = (TintedFactor){0};
-    for (size_t i = 0; i < scene.objects.count; i++) {
-        Object *object = &scene.objects.items[i];
+    Scene *scene = unchecked_scene(run);
+    for (size_t i = 0; i < scene->materials.count; i++)
+        scene->materials.items[i].reflection = scene->materials.items[i].transmission = (TintedFactor){0};
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
         if (object->type == SHAPE_CONE && object->as.cone.finite)
             object->as.cone.radius[1] = fmax(object->as.cone.radius[1], 0.3);
     }
@@ -192,29 +188,21 @@ static Scene plain_scene(void)
 void verify_mirrored_scenes(VerifyRun *run)
 {
     for (uint32_t width = 511; width <= 512; width++) {
-        Scene scene = unchecked_scene(), mirrored = unchecked_scene();
-        scene_mirror(&mirrored);
-        Film image = verify_render(run, &scene, false, width, 128);
-        demand_every_object(run, &scene, &image);
-        Film other = verify_render(run, &mirrored, false, width, 128);
+        Scene *scene = unchecked_scene(run), *mirrored = unchecked_scene(run);
+        scene_mirror(mirrored);
+        Film image = verify_render(run, scene, false, width, 128);
+        demand_every_object(run, scene, &image);
+        Film other = verify_render(run, mirrored, false, width, 128);
         compare(run, &image, &(View){&other, 1, true});
-        film_free(&image);
-        film_free(&other);
-        scene_free(&scene);
-        scene_free(&mirrored);
     }
-    Scene scene = plain_scene(), turned = plain_scene();
-    Film image = verify_render(run, &scene, false, 256, 192);
-    demand_every_object(run, &scene, &image);
-    Renderer *opened = verify_open(run, &scene, false);
+    Scene *scene = plain_scene(run), *turned = plain_scene(run);
+    Film image = verify_render(run, scene, false, 256, 192);
+    demand_every_object(run, scene, &image);
+    Renderer *opened = verify_open(run, scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
-        scene_turn_axes(&turned);
-        Film other = verify_render(run, &turned, false, 256, 192);
+        scene_turn_axes(turned);
+        Film other = verify_render(run, turned, false, 256, 192);
         check_turned(run, opened, &image, &other);
-        film_free(&other);
     }
     renderer_close(opened);
-    film_free(&image);
-    scene_free(&scene);
-    scene_free(&turned);
 }

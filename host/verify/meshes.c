@@ -1,6 +1,5 @@
 // Checks of triangles and of the BVH that are not in the tables.
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
 #include "host/verify/random_shape.h"
@@ -12,11 +11,11 @@
 void verify_far_mesh(VerifyRun *run)
 {
     enum { COUNT = 1 << 16, BATCHES = 16 };
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
-    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
-    Scene scene = scene_empty();
-    scene_far_sphere(&scene);
-    Renderer *opened = verify_open(run, &scene, true);
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
+    TraceHit *hits = verify_allocate(run, COUNT, sizeof *hits);
+    Scene *scene = verify_empty_scene(run);
+    scene_far_sphere(scene);
+    Renderer *opened = verify_open(run, scene, true);
     for (uint64_t batch = 0; batch < verify_part(run, BATCHES); batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
@@ -28,9 +27,6 @@ void verify_far_mesh(VerifyRun *run)
             run->result->leaks += !verify_is_hit(&hits[i]);
     }
     renderer_close(opened);
-    scene_free(&scene);
-    free(rays);
-    free(hits);
 }
 
 // Checks one triangle at every power of two, all at one corner. A ray through the middle of each hits that
@@ -39,16 +35,14 @@ void verify_scale_ladder(VerifyRun *run)
 {
     enum { SMALLEST = -40, LARGEST = 40, COUNT = LARGEST - SMALLEST + 1 };
     TraceRay rays[COUNT];
-    TraceHit hits[COUNT];
-    Scene scene = scene_empty();
+    Scene *scene = verify_empty_scene(run);
     double third = verify_rounded(run, 1.0 / 3);
     for (int k = SMALLEST; k <= LARGEST; k++) {
         double s = ldexp(1, k), across = ldexp(third, k);
-        scene_add_triangle(&scene, (Vector3[]){{0, 0, 0}, {s, 0, 0}, {0, s, 0}});
+        scene_add_triangle(scene, (Vector3[]){{0, 0, 0}, {s, 0, 0}, {0, s, 0}});
         rays[k - SMALLEST] = verify_ray(run, (Vector3){across, across, -s}, (Vector3){0, 0, 1});
     }
-    verify_trace(run, &scene, false, rays, COUNT, hits);
-    scene_free(&scene);
+    const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
     double unscaled = hits[-SMALLEST].t;
     for (int k = SMALLEST; k <= LARGEST; k++) {
         const TraceHit *hit = &hits[k - SMALLEST];
@@ -65,13 +59,11 @@ void verify_scale_ladder(VerifyRun *run)
 void verify_within_triangle(VerifyRun *run)
 {
     enum { COUNT = 100000 };
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
-    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
     verify_family(run, family_beside_sliver, 0, COUNT, rays);
-    Scene scene = scene_empty();
-    scene_add_triangle(&scene, sliver_corners);
-    verify_trace(run, &scene, false, rays, COUNT, hits);
-    scene_free(&scene);
+    Scene *scene = verify_empty_scene(run);
+    scene_add_triangle(scene, sliver_corners);
+    const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
         const Vector3 origin = rays[i].origin, direction = rays[i].direction;
@@ -85,8 +77,6 @@ void verify_within_triangle(VerifyRun *run)
         double slack = 8 * verify_ulp(run, farthest);
         run->result->wrong += hits[i].t < nearest - slack || hits[i].t > farthest + slack;
     }
-    free(rays);
-    free(hits);
 }
 
 // Checks that a triangle seen face on from near has its plane's distance, however far its corners are.
@@ -95,13 +85,11 @@ void verify_facing_triangle(VerifyRun *run)
     enum { COUNT = 1000 };
     static const Vector3 corners[] = {{2001, 1002, -1998}, {2001, -1998, 1002}, {-3999, 1002, 1002}};
     TraceRay rays[COUNT];
-    TraceHit hits[COUNT];
     for (uint64_t i = 0; i < COUNT; i++)
         rays[i] = verify_ray(run, random_in_cube(72, i, 0), (Vector3){1, 2, 2});
-    Scene scene = scene_empty();
-    scene_add_triangle(&scene, corners);
-    verify_trace(run, &scene, false, rays, COUNT, hits);
-    scene_free(&scene);
+    Scene *scene = verify_empty_scene(run);
+    scene_add_triangle(scene, corners);
+    const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         Quad t = 1 - quad3_dot(quad3(rays[i].origin), (Quad3){1, 2, 2}) / 9;
         run->result->leaks += !verify_is_hit(&hits[i]);
@@ -140,8 +128,7 @@ void verify_degenerate_meshes(VerifyRun *run)
         {{0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}},
         {{-1, 0.5, 0}, {1, 0.5, 0}, {0, 0.5, 0}},
     };
-    TraceRay *rays = memory_allocate(count, sizeof *rays);
-    TraceHit *hits = memory_allocate(count, sizeof *hits), *clean = memory_allocate(count, sizeof *clean);
+    TraceRay *rays = verify_allocate(run, count, sizeof *rays);
     for (uint64_t i = 0; i < count; i++) {
         Vector3 origin = vector_scale(random_unit(67, i, 0), 4);
         Vector3 target = random_in_cube(67, i, 3);
@@ -152,13 +139,12 @@ void verify_degenerate_meshes(VerifyRun *run)
         }
         rays[i] = verify_ray(run, origin, vector_subtract(target, origin));
     }
-    Scene scene = scene_empty();
-    add_random_triangles(&scene, SOUND, 0.5);
-    verify_trace(run, &scene, true, rays, count, clean);
+    Scene *scene = verify_empty_scene(run);
+    add_random_triangles(scene, SOUND, 0.5);
+    const TraceHit *clean = verify_trace(run, scene, true, rays, count);
     for (size_t i = 0; i < COUNT_OF(degenerate); i++)
-        scene_add_triangle(&scene, degenerate[i]);
-    verify_trace(run, &scene, true, rays, count, hits);
-    scene_free(&scene);
+        scene_add_triangle(scene, degenerate[i]);
+    const TraceHit *hits = verify_trace(run, scene, true, rays, count);
     for (size_t i = 0; i < count; i++) {
         run->result->wrong += verify_is_hit(&hits[i]) && hits[i].object >= SOUND;
         run->result->differing += !verify_same_bits(&hits[i], &clean[i]);
@@ -166,26 +152,23 @@ void verify_degenerate_meshes(VerifyRun *run)
     static const char *const no_numbers[] = {".nan", ".inf", "-.inf"};
     for (size_t i = 0; i < COUNT_OF(no_numbers); i++)
         run->result->wrong += !is_refused(no_numbers[i]);
-    free(rays);
-    free(hits);
-    free(clean);
 }
 
 enum { M6_TRIANGLES = 10000, M6_OTHERS = 20, M6_RAYS = 1 << 16, M6_BATCHES = 16 };
 
 // Returns a scene of triangles and several objects of every bounded form of every shape.
-static Scene m6_scene(void)
+static Scene *m6_scene(VerifyRun *run)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
-    Scene scene = scene_empty();
-    add_random_triangles(&scene, M6_TRIANGLES, 0.05);
+    Scene *scene = verify_empty_scene(run);
+    add_random_triangles(scene, M6_TRIANGLES, 0.05);
     Random random = {68};
     for (size_t i = 0; i < form_count * M6_OTHERS; i++) {
         Vector3 center = random_in_cube(68, i, 0);
         RandomShape shape =
             random_shape_at(&forms[i % form_count], center, random_between(&random, 0.02, 0.1), &random);
-        if (forms[i % form_count].bounded) array_push(scene.objects, shape.object);
+        if (forms[i % form_count].bounded) array_push(scene->objects, shape.object);
     }
     return scene;
 }
@@ -230,16 +213,17 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
 // agrees with the closest hit when tmax is an ulp before the hit and an ulp behind it.
 void verify_bvh(VerifyRun *run)
 {
-    TraceRay *rays = memory_allocate(M6_RAYS, sizeof *rays);
-    TraceHit *hits = memory_allocate(M6_RAYS, sizeof *hits), *plain = memory_allocate(M6_RAYS, sizeof *plain);
-    Scene scene = m6_scene();
-    Renderer *tree = verify_open(run, &scene, true);
-    Renderer *list = verify_open(run, &scene, false);
+    TraceRay *rays = verify_allocate(run, M6_RAYS, sizeof *rays);
+    TraceHit *hits = verify_allocate(run, M6_RAYS, sizeof *hits),
+             *plain = verify_allocate(run, M6_RAYS, sizeof *plain);
+    Scene *scene = m6_scene(run);
+    Renderer *tree = verify_open(run, scene, true);
+    Renderer *list = verify_open(run, scene, false);
     const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
     for (uint64_t batch = 0; batch < verify_part(run, M6_BATCHES); batch++) {
-        m6_rays(run, &scene, batch * M6_RAYS, NULL, rays);
+        m6_rays(run, scene, batch * M6_RAYS, NULL, rays);
         verify_trace_opened(run, tree, rays, M6_RAYS, hits);
-        m6_rays(run, &scene, batch * M6_RAYS, hits, rays);
+        m6_rays(run, scene, batch * M6_RAYS, hits, rays);
         verify_trace_opened(run, list, rays, M6_RAYS, plain);
         double unlimited = rays[0].tmax;
         for (size_t cut = 0; cut < COUNT_OF(parts); cut++) {
@@ -256,8 +240,4 @@ void verify_bvh(VerifyRun *run)
     }
     renderer_close(tree);
     renderer_close(list);
-    scene_free(&scene);
-    free(rays);
-    free(hits);
-    free(plain);
 }

@@ -1,6 +1,5 @@
 // Checks of refraction and of the camera's frame.
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/compile/camera_basis.h"
 #include "host/verify/run.h"
 #include <math.h>
@@ -23,14 +22,12 @@ static void angles_make(const VerifyRun *run, TraceRay *rays)
 // Checks for total reflection where the squared cosine behind the surface is negative, except within 16 u.
 void verify_critical_angle(VerifyRun *run)
 {
-    TraceRay *rays = memory_allocate(ANGLES, sizeof *rays);
-    TraceHit *hits = memory_allocate(ANGLES, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, ANGLES, sizeof *rays);
     angles_make(run, rays);
-    Scene scene =
-        verify_scene("materials:\n  glass: {transmission: 1, ior: 1.5}\n"
-                     "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 0, 1], material: glass}\n");
-    verify_trace(run, &scene, false, rays, ANGLES, hits);
-    scene_free(&scene);
+    Scene *scene =
+        verify_scene(run, "materials:\n  glass: {transmission: 1, ior: 1.5}\n"
+                          "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 0, 1], material: glass}\n");
+    const TraceHit *hits = verify_trace(run, scene, false, rays, ANGLES);
     const double u = verify_roundoff(run);
     for (size_t i = 0; i < ANGLES; i++) {
         const Vector3 refracted = hits[i].refracted_direction;
@@ -53,8 +50,6 @@ void verify_critical_angle(VerifyRun *run)
         double cosine = sqrt(squared), bound = 8 * u / cosine;
         verify_record_ulps(run, fabs(refracted.z - cosine), cosine, bound / verify_ulp(run, cosine));
     }
-    free(rays);
-    free(hits);
 }
 
 static bool is_camera_refused(const char *camera)

@@ -1,7 +1,6 @@
 // Images of distant, thin or pointed objects. Each pixel's hit or miss is compared with the exact one for
 // the ray that was traced.
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/base/percentile.h"
 #include "host/verify/checks.h"
 #include <math.h>
@@ -33,7 +32,7 @@ static void check_radial_brightness(VerifyRun *run, const Film *image)
 // Checks each pixel, and the 99.9th percentile of errors of Lambert's cosine for light from the eye's side.
 static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *sphere)
 {
-    float *errors = memory_allocate(film_pixel_count(image), sizeof *errors);
+    float *errors = verify_allocate(run, film_pixel_count(image), sizeof *errors);
     size_t count = 0;
     for (size_t i = 0; i < film_pixel_count(image); i++) {
         ReferenceHit exact = verify_check_pixel(run, sphere, image, i);
@@ -44,26 +43,23 @@ static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *
     bool near = sphere->distance <= 1e3; // farther away the 8 ulp of t exceed the bound of B
     if (count > 0 && (near || run->tier > TIER_B))
         verify_record(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
-    free(errors);
 }
 
 void verify_far_fringe(VerifyRun *run)
 {
-    Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, -1]}\n"
-                               "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
+    Scene *scene = verify_scene(run, "lights:\n  - directional: {direction: [0, 0, -1]}\n"
+                                     "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
     static const double distances[] = {10, 100, 1e3, 1e4};
     for (size_t k = 0; k < COUNT_OF(distances); k++) {
         double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
-        scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
+        scene->camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
         const uint32_t side = run->settings->quick ? 128 : 512;
-        Film image = verify_render(run, &scene, false, side, side);
+        Film image = verify_render(run, scene, false, side, side);
         check_radial_brightness(run, &image);
-        VerifyTarget sphere = verify_target(run, &scene.objects.items[0], eye);
+        VerifyTarget sphere = verify_target(run, &scene->objects.items[0], eye);
         if (run->tier != TIER_A) check_fringe(run, &image, &sphere);
-        film_free(&image);
     }
-    scene_free(&scene);
 }
 
 static void check_pixels(VerifyRun *run, const Film *image, const Scene *scene)
@@ -76,12 +72,12 @@ static void check_pixels(VerifyRun *run, const Film *image, const Scene *scene)
 // Checks that every column has one stretch of pixels without a gap.
 void verify_wire(VerifyRun *run)
 {
-    Scene scene =
-        verify_scene("objects:\n  - cylinder: {from: [-10000, 0, 0], to: [10000, 0, 0], radius: 0.001}\n");
+    Scene *scene = verify_scene(
+        run, "objects:\n  - cylinder: {from: [-10000, 0, 0], to: [10000, 0, 0], radius: 0.001}\n");
     const Vector3 eye = {0, 0, -10};
-    scene.camera = verify_camera(eye, origin, 0.293);
-    Film image = verify_render(run, &scene, false, 1024, 64);
-    check_pixels(run, &image, &scene);
+    scene->camera = verify_camera(eye, origin, 0.293);
+    Film image = verify_render(run, scene, false, 1024, 64);
+    check_pixels(run, &image, scene);
     for (uint32_t column = 0; column < image.width; column++) {
         size_t stretches = 0;
         for (uint32_t row = 0; row < image.height; row++) {
@@ -91,8 +87,6 @@ void verify_wire(VerifyRun *run)
         }
         run->result->leaks += stretches != 1;
     }
-    film_free(&image);
-    scene_free(&scene);
 }
 
 // Checks that, with the eye on the axis and the light behind it, the tip is as bright as the side around it.
@@ -105,12 +99,13 @@ void verify_apex(VerifyRun *run)
     } views[] = {{{0, 0, -5}, "[0, 0, 1]"}, {{5, 0, 0}, "[-1, 0, 0]"}};
     enum { SIDE = 65 };
     for (size_t k = 0; k < COUNT_OF(views); k++) {
-        Scene scene = verify_scene("lights:\n  - directional: {direction: %s}\n"
-                                   "objects:\n  - cone: {from: [0, 0, 0], to: [0, 0, 10], radius: [0, 5]}\n",
-                                   views[k].light);
-        scene.camera = verify_camera(views[k].eye, origin, 0);
-        scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
-        Film image = verify_render(run, &scene, false, SIDE, SIDE);
+        Scene *scene = verify_scene(run,
+                                    "lights:\n  - directional: {direction: %s}\n"
+                                    "objects:\n  - cone: {from: [0, 0, 0], to: [0, 0, 10], radius: [0, 5]}\n",
+                                    views[k].light);
+        scene->camera = verify_camera(views[k].eye, origin, 0);
+        scene->camera.half_tangent = SIDE * 1e-4 / 2 / 5;
+        Film image = verify_render(run, scene, false, SIDE, SIDE);
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             if (k == 0) run->result->wrong += !verify_pixel_found(&image, i) || !(image.color[3 * i] > 0);
             if (!verify_pixel_found(&image, i)) continue;
@@ -119,30 +114,26 @@ void verify_apex(VerifyRun *run)
             // + 6 u: a root off by 3 ulp; + 4 u: a quotient off by 2
             verify_record(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
-        film_free(&image);
-        scene_free(&scene);
     }
 }
 
-static Scene torus_scene(double minor)
+static Scene *torus_scene(VerifyRun *run, double minor)
 {
-    return verify_scene("objects:\n  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: %g}\n",
-                        minor);
+    return verify_scene(
+        run, "objects:\n  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: %g}\n", minor);
 }
 
 void verify_far_torus(VerifyRun *run)
 {
     static const double distances[] = {10, 50, 1000};
-    Scene scene = torus_scene(0.25);
+    Scene *scene = torus_scene(run, 0.25);
     for (size_t k = 0; k < COUNT_OF(distances); k++) {
         const Vector3 eye = {0.3 * distances[k], 0.4 * distances[k], -0.866 * distances[k]};
-        scene.camera = verify_camera(eye, origin, 0);
-        scene.camera.half_tangent = 1.3 / distances[k];
-        Film image = verify_render(run, &scene, false, 160, 160);
-        check_pixels(run, &image, &scene);
-        film_free(&image);
+        scene->camera = verify_camera(eye, origin, 0);
+        scene->camera.half_tangent = 1.3 / distances[k];
+        Film image = verify_render(run, scene, false, 160, 160);
+        check_pixels(run, &image, scene);
     }
-    scene_free(&scene);
 }
 
 // Checks hits along tangents, where t has little meaning but the point must lie on the torus.
@@ -152,18 +143,16 @@ void verify_tangent_circle(VerifyRun *run)
     enum { COUNT = COUNT_OF(heights) };
     if (run->tier == TIER_A) return;
     TraceRay rays[COUNT];
-    TraceHit hits[COUNT];
     for (size_t i = 0; i < COUNT; i++)
         rays[i] = verify_ray(run, (Vector3){-5, 0, heights[i]}, (Vector3){1, 0, 0});
-    Scene scene = torus_scene(0.25);
-    verify_trace(run, &scene, false, rays, COUNT, hits);
+    Scene *scene = torus_scene(run, 0.25);
+    const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
         Quad3 point = {-5 + (Quad)hits[i].t, 0, rays[i].origin.z};
-        ReferenceSurface surface = reference_surface(&scene.objects.items[0], point);
+        ReferenceSurface surface = reference_surface(&scene->objects.items[0], point);
         run->result->off_surface += reference_surface_distance(&surface) > 16 * verify_roundoff(run);
     }
-    scene_free(&scene);
 }
 
 // Returns the pixel that stands for the part of the image to which a pixel belongs.
@@ -175,9 +164,9 @@ static size_t part_of(size_t *parents, size_t pixel)
 }
 
 // Returns the number of connected parts of the hit pixels. Pixels that touch at a corner are connected.
-static size_t count_parts(const Film *image)
+static size_t count_parts(VerifyRun *run, const Film *image)
 {
-    size_t *parents = memory_allocate(film_pixel_count(image), sizeof *parents), count = 0;
+    size_t *parents = verify_allocate(run, film_pixel_count(image), sizeof *parents), count = 0;
     for (size_t pixel = 0; pixel < film_pixel_count(image); pixel++) {
         const size_t column = pixel % image->width, row = pixel / image->width;
         parents[pixel] = pixel;
@@ -193,7 +182,6 @@ static size_t count_parts(const Film *image)
                 parents[part] = part_of(parents, pixel);
             }
     }
-    free(parents);
     return count;
 }
 
@@ -206,13 +194,11 @@ void verify_thin_ring(VerifyRun *run)
         uint32_t side;
     } views[] = {{30, 1024}, {17.2, 1536}};
     const Vector3 eye = {0, -5, 5};
-    Scene scene = torus_scene(0.001);
+    Scene *scene = torus_scene(run, 0.001);
     for (size_t k = run->settings->quick ? 1 : 0; k < COUNT_OF(views); k++) {
-        scene.camera = verify_camera(eye, origin, views[k].fov);
-        Film image = verify_render(run, &scene, false, views[k].side, views[k].side);
-        check_pixels(run, &image, &scene);
-        if (k == 1) run->result->leaks += count_parts(&image) != 1;
-        film_free(&image);
+        scene->camera = verify_camera(eye, origin, views[k].fov);
+        Film image = verify_render(run, scene, false, views[k].side, views[k].side);
+        check_pixels(run, &image, scene);
+        if (k == 1) run->result->leaks += count_parts(run, &image) != 1;
     }
-    scene_free(&scene);
 }

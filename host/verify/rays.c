@@ -1,22 +1,18 @@
 #include "host/verify/rays.h"
 
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/verify/checks.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { BATCH = 1 << 16 };
 
-Scene verify_rays_scene(const VerifyRays *set)
+Scene *verify_rays_scene(VerifyRun *run, const VerifyRays *set)
 {
-    if (set->scene_make) {
-        Scene scene = scene_empty();
-        set->scene_make(&scene);
-        return scene;
-    }
-    return verify_scene("objects:\n%s", set->objects);
+    if (!set->scene_make) return verify_scene(run, "objects:\n%s", set->objects);
+    Scene *scene = verify_empty_scene(run);
+    set->scene_make(scene);
+    return scene;
 }
 
 static double nudged(const VerifyRun *run, double value, double toward)
@@ -54,7 +50,7 @@ void verify_family(const VerifyRun *run, RayFamily family, uint64_t first, size_
     }
 }
 
-VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set)
+VerifyTestRays verify_test_rays(VerifyRun *run, const VerifyRays *set)
 {
     VerifyTestRays tests = {0};
     for (size_t i = 0; set->rays && i < set->ray_count; i++)
@@ -64,6 +60,7 @@ VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set)
         verify_family(run, set->family, i, 1, &item.ray);
         array_push(tests, item);
     }
+    array_push(run->memory.blocks, tests.items);
     return tests;
 }
 
@@ -79,29 +76,24 @@ static void run_numbers(VerifyRun *run, const VerifyRays *set, const Scene *scen
     VerifyTestRays tests = verify_test_rays(run, set);
     Object *objects = verify_objects(run, scene);
     const size_t count = tests.count;
-    TraceRay *rays = memory_allocate(2 * count, sizeof *rays), *turned = rays + count;
-    TraceHit *hits = memory_allocate(2 * count, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, 2 * count, sizeof *rays), *turned = rays + count;
     for (size_t i = 0; i < count; i++)
         rays[i] = turned[count - 1 - i] = tests.items[i].ray;
-    verify_trace(run, scene, false, rays, count, hits);
-    verify_trace(run, scene, true, turned, count, hits + count);
+    const TraceHit *hits = verify_trace(run, scene, false, rays, count);
+    const TraceHit *turned_hits = verify_trace(run, scene, true, turned, count);
     for (size_t i = 0; i < count; i++) {
         verify_check_ray(run, objects, scene->objects.count, &tests.items[i], &hits[i]);
         check_surface(run, objects, &rays[i], &hits[i]);
-        run->result->differing += !verify_same_bits(&hits[i], &hits[2 * count - 1 - i]);
+        run->result->differing += !verify_same_bits(&hits[i], &turned_hits[count - 1 - i]);
     }
-    free(tests.items);
-    free(objects);
-    free(rays);
-    free(hits);
 }
 
 static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene)
 {
     VerifyTestRays tests = verify_test_rays(run, set);
     Object *objects = verify_objects(run, scene);
-    TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
-    TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, BATCH, sizeof *rays);
+    TraceHit *hits = verify_allocate(run, BATCH, sizeof *hits);
     Renderer *opened = verify_open(run, scene, set->scene_make != NULL);
     const size_t ray_count = verify_part(run, set->ray_count);
     for (size_t first = 0; first < ray_count; first += BATCH) {
@@ -116,15 +108,10 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
         }
     }
     renderer_close(opened);
-    free(tests.items);
-    free(objects);
-    free(rays);
-    free(hits);
 }
 
 void verify_rays_run(VerifyRun *run, const VerifyRays *set)
 {
-    Scene scene = verify_rays_scene(set);
-    (set->rays ? run_numbers : run_family)(run, set, &scene);
-    scene_free(&scene);
+    Scene *scene = verify_rays_scene(run, set);
+    (set->rays ? run_numbers : run_family)(run, set, scene);
 }

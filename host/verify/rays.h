@@ -50,10 +50,10 @@ typedef struct {
 
 typedef ARRAY_OF(VerifyTestRay) VerifyTestRays;
 
-// Returns the scene of a set. The caller frees it with scene_free.
-Scene verify_rays_scene(const VerifyRays *set);
-// Returns the rays of a set that have exact answers, at the precision at work. The caller frees the items.
-VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set);
+// Returns the scene of a set, for the duration of the case.
+Scene *verify_rays_scene(VerifyRun *run, const VerifyRays *set);
+// Returns the rays of a set that have exact answers, at the precision at work, for the duration of the case.
+VerifyTestRays verify_test_rays(VerifyRun *run, const VerifyRays *set);
 // Sets rays `first` to `first` + `count` - 1 of a family, rounded to the precision at work.
 void verify_family(const VerifyRun *run, RayFamily family, uint64_t first, size_t count, TraceRay *rays);
 // Traces a set of rays and checks their hits.

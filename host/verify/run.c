@@ -1,6 +1,7 @@
 #include "host/verify/run.h"
 
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/base/ulp.h"
 #include "host/import/load.h"
@@ -10,6 +11,28 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+void *verify_allocate(VerifyRun *run, size_t count, size_t size)
+{
+    void *block = memory_allocate(count, size);
+    array_push(run->memory.blocks, block);
+    return block;
+}
+
+void verify_release(VerifyRun *run)
+{
+    CaseMemory *memory = &run->memory;
+    for (size_t i = 0; i < memory->films.count; i++)
+        film_free(&memory->films.items[i]);
+    for (size_t i = 0; i < memory->scenes.count; i++)
+        scene_free(memory->scenes.items[i]);
+    for (size_t i = 0; i < memory->blocks.count; i++)
+        free(memory->blocks.items[i]);
+    free(memory->films.items);
+    free(memory->scenes.items);
+    free(memory->blocks.items);
+    *memory = (CaseMemory){0};
+}
 
 size_t verify_part(const VerifyRun *run, size_t count)
 {
@@ -169,12 +192,13 @@ void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays,
     }
 }
 
-void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
-                  TraceHit *hits)
+const TraceHit *verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count)
 {
     const RenderSettings settings = scene_settings(run, bvh, 0, 0);
+    TraceHit *hits = verify_allocate(run, count, sizeof *hits);
     scene_assign(run, &run->tracer, scene, &settings);
     verify_trace_opened(run, run->tracer, rays, count, hits);
+    return hits;
 }
 
 static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
@@ -199,6 +223,7 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
         run->kernels->render_hash = renderer_report(run->painter)->kernel_hash;
     else
         film = film_allocate(width, height, (uint32_t)scene->lights.count, aovs);
+    array_push(run->memory.films, film);
     const size_t pixels = film_pixel_count(&film);
     run->result->ray_count += pixels;
     for (size_t i = 0; i < pixels; i++)
@@ -251,14 +276,32 @@ static bool scene_read(Scene *scene, const char *text, MessageList *messages)
     return scene_read_yaml(scene, &source, &(SceneOptions){0}, messages);
 }
 
-Scene verify_scene(const char *format, ...)
+// Returns a scene of zeros that lasts until the case ends.
+static Scene *scene_allocate(VerifyRun *run)
+{
+    Scene *scene = verify_allocate(run, 1, sizeof *scene);
+    *scene = (Scene){0};
+    array_push(run->memory.scenes, scene);
+    return scene;
+}
+
+Scene *verify_empty_scene(VerifyRun *run)
+{
+    Scene *scene = scene_allocate(run);
+    scene->camera = (Camera){.look_at = {0, 0, 1}, .half_tangent = 1};
+    const Material material = material_default();
+    scene_add_material(scene, &material, "");
+    return scene;
+}
+
+Scene *verify_scene(VerifyRun *run, const char *format, ...)
 {
     char *members;
     ARGUMENTS_FORMAT(members, format);
     char *text = text_format("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", members);
     MessageList messages = {0};
-    Scene scene;
-    if (!scene_read(&scene, text, &messages))
+    Scene *scene = scene_allocate(run);
+    if (!scene_read(scene, text, &messages))
         fault("a scene of verify cannot be read: %s\n%s", message_list_text(&messages), text);
     message_list_free(&messages);
     free(members);

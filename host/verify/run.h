@@ -1,7 +1,15 @@
 // The state and the functions that the hard cases share.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/verify/verify.h"
+
+// What a case has allocated.
+typedef struct {
+    ARRAY_OF(void *) blocks;
+    ARRAY_OF(Scene *) scenes;
+    ARRAY_OF(Film) films;
+} CaseMemory;
 
 typedef struct {
     Compute *compute;
@@ -10,6 +18,7 @@ typedef struct {
     bool inexact; // quotients and roots are off by as much as OpenCL C allows, up to 2 and 3 ulp
     VerifyResult *result;
     VerifyKernels *kernels;
+    CaseMemory memory;
     // The renderers of the last scenes of verify_trace and verify_render, or NULL. The next scene reuses
     // them with their kernels, because loading kernels takes longer than most scenes.
     Renderer *tracer, *painter;
@@ -32,6 +41,11 @@ static inline bool verify_is_double(const VerifyRun *run)
 {
     return run->tier == TIER_D;
 }
+
+// Allocates memory for the duration of the case.
+void *verify_allocate(VerifyRun *run, size_t count, size_t size);
+// Ends a case, and frees what it has allocated.
+void verify_release(VerifyRun *run);
 
 // Returns how many of `count` random rays or pixels to use: all, or a sixteenth in a quick run.
 size_t verify_part(const VerifyRun *run, size_t count);
@@ -56,9 +70,10 @@ Renderer *verify_open(VerifyRun *run, const Scene *scene, bool bvh);
 // no result is reported.
 void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays, size_t count,
                          TraceHit *hits);
-// Opens a scene, traces rays and counts the unsound hits. Hits are zeros after the device has failed.
-void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
-                  TraceHit *hits);
+// Opens a scene, traces rays and counts the unsound hits. Returns the hits for the duration of the case. They
+// are zeros after the device has failed.
+const TraceHit *verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays,
+                             size_t count);
 bool verify_same_bits(const TraceHit *a, const TraceHit *b); // compares object, distance and normal
 
 // Records an error of a value in ulp of the value, and counts it as wrong if it exceeds this many.
@@ -66,14 +81,16 @@ void verify_record_ulps(VerifyRun *run, double error, double value, double bound
 // Records an error in the given unit, and counts it as wrong if it exceeds the bound.
 void verify_record(VerifyRun *run, double error, double bound, const char *unit);
 
-// Reads a built-in scene, formatted as by printf: native YAML without the camera. A text that cannot be read
-// is a bug. The caller frees the scene with scene_free.
-Scene verify_scene(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// Returns a scene with a camera, one material and no objects, for the duration of the case.
+Scene *verify_empty_scene(VerifyRun *run);
+// Reads a built-in scene for the duration of the case. The text, formatted as by printf, is native YAML
+// without the camera. A text that cannot be read is a bug.
+Scene *verify_scene(VerifyRun *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool verify_is_refused(const char *text); // whether the YAML reader rejects a scene with an error
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
-// Renders all layers of a film and counts the unsound pixels. After the device has failed, they are zeros.
-// Free the film with film_free.
+// Renders all layers of a film for the duration of the case and counts the unsound pixels. After the device
+// has failed, they are zeros.
 Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height);
 
 static inline bool verify_pixel_found(const Film *image, size_t pixel)

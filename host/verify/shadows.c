@@ -19,14 +19,14 @@ void verify_plane_acne(VerifyRun *run)
             vector_add(point, vector_add(vector_scale(unit, 3 * size), vector_scale(across, 0.5 * size)));
         for (size_t light = 0; light < COUNT_OF(elevations); light++) {
             double angle = elevations[light] * (M_PI / 180);
-            Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, 1]}\n"
-                                       "objects:\n  - plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n");
+            Scene *scene = verify_scene(run, "lights:\n  - directional: {direction: [0, 0, 1]}\n"
+                                             "objects:\n  - plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n");
             Vector3 to_light = vector_add(vector_scale(across, cos(angle)), vector_scale(unit, sin(angle)));
-            scene.lights.items[0].direction = vector_scale(to_light, -1);
-            scene.objects.items[0].as.plane.point = point;
-            scene.camera = verify_camera(eye, point, 60);
-            Film image = verify_render(run, &scene, false, 128, 128);
-            Vector3 direction = vector_normalize(scene.lights.items[0].direction);
+            scene->lights.items[0].direction = vector_scale(to_light, -1);
+            scene->objects.items[0].as.plane.point = point;
+            scene->camera = verify_camera(eye, point, 60);
+            Film image = verify_render(run, scene, false, 128, 128);
+            Vector3 direction = vector_normalize(scene->lights.items[0].direction);
             Quad3 stored = quad3(verify_rounded_vector(run, direction));
             Quad cosine = -quad3_dot(quad3_unit(quad3(normal)), stored);
             double least = INFINITY, most = 0;
@@ -42,8 +42,6 @@ void verify_plane_acne(VerifyRun *run)
             verify_record(
                 run, (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u, 8,
                 "u");
-            film_free(&image);
-            scene_free(&scene);
         }
     }
 }
@@ -51,16 +49,16 @@ void verify_plane_acne(VerifyRun *run)
 // Checks a plate a millionth as thick as wide, lit from one side. That side is lit and the other is dark.
 void verify_thin_plate(VerifyRun *run)
 {
-    Scene scene = verify_scene("lights:\n  - point: {position: [0.5, 0.5, -2]}\n"
-                               "  - directional: {direction: [0.1, 0.2, 1]}\n"
-                               "objects:\n  - box: {min: [0, 0, 0], max: [1, 1, 1e-6]}\n");
+    Scene *scene = verify_scene(run, "lights:\n  - point: {position: [0.5, 0.5, -2]}\n"
+                                     "  - directional: {direction: [0.1, 0.2, 1]}\n"
+                                     "objects:\n  - box: {min: [0, 0, 0], max: [1, 1, 1e-6]}\n");
     for (size_t k = 0; k < 4; k++) {
         bool above = k & 1, light_above = k & 2;
         const Vector3 eye = {0.5, 0.5, above ? 2 : -2}, center = {0.5, 0.5, 0};
-        scene.camera = verify_camera(eye, center, 40);
-        scene.lights.items[0].position.z = light_above ? 2 : -2;
-        scene.lights.items[1].direction.z = light_above ? -1 : 1;
-        Film image = verify_render(run, &scene, false, 256, 256);
+        scene->camera = verify_camera(eye, center, 40);
+        scene->lights.items[0].position.z = light_above ? 2 : -2;
+        scene->lights.items[1].direction.z = light_above ? -1 : 1;
+        Film image = verify_render(run, scene, false, 256, 256);
         size_t seen = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             if (image.object[i] == UINT32_MAX) continue;
@@ -72,9 +70,7 @@ void verify_thin_plate(VerifyRun *run)
                 run->result->leaks += color[0] != 0 || !image.shadow[2 * i] || !image.shadow[2 * i + 1];
         }
         run->result->wrong += seen == 0;
-        film_free(&image);
     }
-    scene_free(&scene);
 }
 
 // Counts a pixel that does not show the nearer of plane 0 and sphere 1. Skips the sphere's rim and places
@@ -101,16 +97,16 @@ void verify_contact_shadow(VerifyRun *run)
     } views[] = {{{3, 2, 3}, 60}, {{3, 0.001, 3}, 0.5}, {{0.2, 0.02, 0.2}, 40}};
     const Vector3 touched = {0, 0, 0}, light = {0, 10, 0};
     const double edge = 10 / sqrt(80);
-    Scene scene = verify_scene("lights:\n  - point: {position: [0, 10, 0]}\n"
-                               "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-                               "  - sphere: {center: [0, 1, 0], radius: 1}\n");
+    Scene *scene = verify_scene(run, "lights:\n  - point: {position: [0, 10, 0]}\n"
+                                     "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                                     "  - sphere: {center: [0, 1, 0], radius: 1}\n");
     for (size_t k = 0; k < COUNT_OF(views); k++) {
         const Vector3 eye = views[k].eye;
-        scene.camera = verify_camera(eye, touched, views[k].fov);
-        Film image = verify_render(run, &scene, false, 384, 384);
+        scene->camera = verify_camera(eye, touched, views[k].fov);
+        Film image = verify_render(run, scene, false, 384, 384);
         Quad3 to_light = quad3(vector_subtract(light, eye)), ground = quad3(vector_subtract(touched, eye));
-        VerifyTarget targets[] = {verify_target(run, &scene.objects.items[0], eye),
-                                  verify_target(run, &scene.objects.items[1], eye)};
+        VerifyTarget targets[] = {verify_target(run, &scene->objects.items[0], eye),
+                                  verify_target(run, &scene->objects.items[1], eye)};
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             Quad3 direction = quad3(vector_from(image.ray + 3 * i));
             bool dark = image.shadow[i];
@@ -128,7 +124,5 @@ void verify_contact_shadow(VerifyRun *run)
                 run->result->wrong += quad_absolute(facing) > 1e-5 && dark != (facing < 0);
             }
         }
-        film_free(&image);
     }
-    scene_free(&scene);
 }

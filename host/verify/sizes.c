@@ -96,10 +96,10 @@ static void check_pixel(VerifyRun *run, const Object *object, double band, bool 
 
 static void check_sizes(VerifyRun *run, const SizedShape *shape)
 {
-    Scene scene = verify_scene("lights:\n  - directional: {direction: [0, -1, 0]}\nobjects: []\n");
+    Scene *scene = verify_scene(run, "lights:\n  - directional: {direction: [0, -1, 0]}\nobjects: []\n");
     const Material material = material_default();
-    scene_add_object(&scene, shape->start, &material);
-    Object *object = &scene.objects.items[0];
+    scene_add_object(scene, shape->start, &material);
+    Object *object = &scene->objects.items[0];
     const int largest = QUAD_BITS - (verify_is_double(run) ? DBL_MANT_DIG : FLT_MANT_DIG) - 8;
     for (int exponent = -20; exponent <= (largest < 60 ? largest : 60); exponent += 8) {
         const double size = ldexp(0x8ccccccd, exponent - 31); // 1.1 in 32 bits
@@ -107,15 +107,13 @@ static void check_sizes(VerifyRun *run, const SizedShape *shape)
         reference_grow_object(object, &shape->start, &shape->growth, size);
         const ReferenceSurface whole = reference_surface(object, quad3(eye));
         const Vector3 ahead = vector_add(eye, (Vector3){0.1, -1, 1});
-        scene.camera = verify_camera(eye, is_ground ? ahead : whole.center,
-                                     is_ground ? 100 : atan(size / eye.y) * (150 / M_PI));
+        scene->camera = verify_camera(eye, is_ground ? ahead : whole.center,
+                                      is_ground ? 100 : atan(size / eye.y) * (150 / M_PI));
         const double band = eye.y + (shape->is_flat ? size : sqrt(2 * eye.y * size));
-        Film image = verify_render(run, &scene, false, 32, 32);
+        Film image = verify_render(run, scene, false, 32, 32);
         for (size_t pixel = 0; run->tier != TIER_A && pixel < film_pixel_count(&image); pixel++)
             check_pixel(run, object, band, is_ground, &image, pixel);
-        film_free(&image);
     }
-    scene_free(&scene);
 }
 
 void verify_sizes(VerifyRun *run)

@@ -1,6 +1,5 @@
 // Checks of spheres and boxes that are not in the tables.
 #include "host/base/array.h"
-#include "host/base/memory.h"
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
 #include "host/verify/run.h"
@@ -15,7 +14,6 @@ void verify_scaled_directions(VerifyRun *run)
     enum { COUNT = 100 };
     static const int exponents[] = {0, 20, -20};
     TraceRay rays[3][COUNT];
-    TraceHit hits[3][COUNT];
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 origin = vector_scale(random_unit(61, i, 0), i % 2 ? 0.7 : 3);
         Vector3 target = vector_scale(random_unit(61, i, 3), 0.9);
@@ -25,22 +23,21 @@ void verify_scaled_directions(VerifyRun *run)
             rays[k][i].direction = vector_scale(rays[0][i].direction, ldexp(1, exponents[k]));
         }
     }
-    Scene scene = verify_scene("objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
-    verify_trace(run, &scene, false, rays[0], 3 * (size_t)COUNT, hits[0]);
-    scene_free(&scene);
+    Scene *scene = verify_scene(run, "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
+    const TraceHit *hits = verify_trace(run, scene, false, rays[0], 3 * (size_t)COUNT);
     for (size_t i = 0; i < COUNT; i++) {
-        run->result->wrong += !verify_is_hit(&hits[0][i]);
+        run->result->wrong += !verify_is_hit(&hits[i]);
         for (size_t k = 1; k < 3; k++)
-            run->result->differing += ldexp(hits[k][i].t, exponents[k]) != hits[0][i].t;
+            run->result->differing += ldexp(hits[k * COUNT + i].t, exponents[k]) != hits[i].t;
     }
 }
 
 enum { SPHERES = 50, GROUPS = 20, DIRECTIONS = 500 };
 
 // Returns spheres whose radii and centers span eight powers of ten.
-static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
+static Scene *spheres_of_all_sizes(VerifyRun *run, unsigned group)
 {
-    Scene scene = scene_empty();
+    Scene *scene = verify_empty_scene(run);
     for (uint64_t i = 0; i < SPHERES; i++) {
         uint64_t index = group * SPHERES + i;
         Object object = {.type = SHAPE_SPHERE};
@@ -50,7 +47,7 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
                 verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
         }
         object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
-        array_push(scene.objects, object);
+        array_push(scene->objects, object);
     }
     return scene;
 }
@@ -112,14 +109,13 @@ void verify_leaving_spheres(VerifyRun *run)
     for (unsigned group = 0; group < verify_part(run, GROUPS); group++) {
         TraceRay rays[SPHERES];
         TraceHit hits[SPHERES];
-        Scene scene = spheres_of_all_sizes(run, group);
-        rays_at_spheres(run, &scene, group, rays);
-        Renderer *opened = verify_open(run, &scene, false);
+        Scene *scene = spheres_of_all_sizes(run, group);
+        rays_at_spheres(run, scene, group, rays);
+        Renderer *opened = verify_open(run, scene, false);
         verify_trace_opened(run, opened, rays, SPHERES, hits);
         for (size_t i = 0; i < SPHERES; i++)
-            if (hits[i].object == i) leave_sphere(run, &scene, opened, i, &hits[i]);
+            if (hits[i].object == i) leave_sphere(run, scene, opened, i, &hits[i]);
         renderer_close(opened);
-        scene_free(&scene);
     }
 }
 
@@ -128,12 +124,10 @@ void verify_points_on_faces(VerifyRun *run)
 {
     enum { COUNT = 30000 };
     if (run->tier == TIER_A) return;
-    TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
-    TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
     verify_family(run, family_in_room, 0, COUNT, rays);
-    Scene scene = verify_scene("objects:\n  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n");
-    verify_trace(run, &scene, false, rays, COUNT, hits);
-    scene_free(&scene);
+    Scene *scene = verify_scene(run, "objects:\n  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n");
+    const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
         size_t on_face = 0;
@@ -141,8 +135,6 @@ void verify_points_on_faces(VerifyRun *run)
             if (fabs((&hits[i].normal.x)[axis]) == 1) on_face += fabs((&hits[i].position.x)[axis]) == 1;
         run->result->wrong += on_face != 1;
     }
-    free(rays);
-    free(hits);
 }
 
 // Checks that among objects at the same distance the first in the list is hit, and that the distance does
@@ -151,35 +143,36 @@ void verify_coincident_faces(VerifyRun *run)
 {
     enum { COUNT = 1200, COINCIDENT = 6 };
     static TraceRay rays[COUNT];
-    static TraceHit alone[COINCIDENT][COUNT], hits[COUNT];
+    const TraceHit *alone[COINCIDENT];
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 origin = {0.5, random_at(7, i, 0), random_at(7, i, 1)}, direction = {1, 0, 0};
         if (i % 2)
             direction = vector_subtract((Vector3){2 * random_at(7, i, 2), 0, random_at(7, i, 3)}, origin);
         rays[i] = verify_ray(run, origin, direction);
     }
-    Scene scene = verify_scene("objects:\n"
-                               "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
-                               "  - box: {min: [1, 0, 0], max: [2, 1, 1]}\n"
-                               "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-                               "  - triangle: {vertices: [[-1, 0.25, 0.25], [3, 0.25, 0.25], [1, 0.25, 2]]}\n"
-                               "  - triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}\n"
-                               "  - disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}\n");
+    Scene *scene =
+        verify_scene(run, "objects:\n"
+                          "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
+                          "  - box: {min: [1, 0, 0], max: [2, 1, 1]}\n"
+                          "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                          "  - triangle: {vertices: [[-1, 0.25, 0.25], [3, 0.25, 0.25], [1, 0.25, 2]]}\n"
+                          "  - triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}\n"
+                          "  - disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}\n");
     Object objects[COINCIDENT];
-    memcpy(objects, scene.objects.items, sizeof objects);
-    scene.objects.count = 1;
+    memcpy(objects, scene->objects.items, sizeof objects);
+    scene->objects.count = 1;
     for (size_t k = 0; k < COINCIDENT; k++) {
-        scene.objects.items[0] = objects[k];
-        verify_trace(run, &scene, false, rays, COUNT, alone[k]);
+        scene->objects.items[0] = objects[k];
+        alone[k] = verify_trace(run, scene, false, rays, COUNT);
     }
-    scene.objects.count = COINCIDENT;
+    scene->objects.count = COINCIDENT;
     for (size_t order = 0; order < 2 * (size_t)COINCIDENT; order++) {
         size_t place_of[COINCIDENT];
         for (size_t k = 0; k < COINCIDENT; k++) {
             place_of[k] = (order < COINCIDENT ? k + order : COINCIDENT - 1 - k + order) % COINCIDENT;
-            scene.objects.items[k] = objects[place_of[k]];
+            scene->objects.items[k] = objects[place_of[k]];
         }
-        verify_trace(run, &scene, order % 2, rays, COUNT, hits);
+        const TraceHit *hits = verify_trace(run, scene, order % 2, rays, COUNT);
         for (size_t i = 0; i < COUNT; i++) {
             uint32_t nearest = UINT32_MAX;
             double t = INFINITY;
@@ -192,7 +185,6 @@ void verify_coincident_faces(VerifyRun *run)
             run->result->differing += hits[i].object != nearest || (nearest != UINT32_MAX && hits[i].t != t);
         }
     }
-    scene_free(&scene);
     for (size_t i = 0; i < COUNT; i += 2)
         run->result->wrong += alone[0][i].t != 0.5 || alone[1][i].t != 0.5;
 }

@@ -111,6 +111,7 @@ void verify_run(Compute *compute, const VerifySettings *settings, const VerifySi
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
+        verify_release(&run);
         if (!sink->receive(sink->context, &result)) break;
     }
     renderer_close(run.tracer);

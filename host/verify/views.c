@@ -5,27 +5,26 @@
 
 enum { SIDE = 65 };
 
-static Scene tiled_scene(Vector3 place)
+static Scene *tiled_scene(VerifyRun *run, Vector3 place)
 {
-    Scene scene =
-        verify_scene("ambient: [1, 1, 1]\nbackground: [0.2, 0.3, 0.4]\n"
-                     "lights:\n  - directional: {direction: [0.3, -1, 0.2]}\n"
-                     "materials:\n"
-                     "  tiles: {checker: {colors: [[1, 1, 1], [0.5, 0.5, 0.5]], size: 1}, diffuse: 0}\n"
-                     "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n"
-                     "  - sphere: {center: [0, 0, 0], radius: 0.5}\n");
-    scene.objects.items[0].as.plane.point = place;
-    scene.objects.items[1].as.sphere.center = place;
+    Scene *scene =
+        verify_scene(run, "ambient: [1, 1, 1]\nbackground: [0.2, 0.3, 0.4]\n"
+                          "lights:\n  - directional: {direction: [0.3, -1, 0.2]}\n"
+                          "materials:\n"
+                          "  tiles: {checker: {colors: [[1, 1, 1], [0.5, 0.5, 0.5]], size: 1}, diffuse: 0}\n"
+                          "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: tiles}\n"
+                          "  - sphere: {center: [0, 0, 0], radius: 0.5}\n");
+    scene->objects.items[0].as.plane.point = place;
+    scene->objects.items[1].as.sphere.center = place;
     return scene;
 }
 
 static Film view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
 {
-    Scene scene = tiled_scene(place);
-    scene.camera = verify_camera(eye, look_at, fov);
-    scene.camera.up = up;
-    Film image = verify_render(run, &scene, false, SIDE, SIDE);
-    scene_free(&scene);
+    Scene *scene = tiled_scene(run, place);
+    scene->camera = verify_camera(eye, look_at, fov);
+    scene->camera.up = up;
+    Film image = verify_render(run, scene, false, SIDE, SIDE);
     return image;
 }
 
@@ -52,15 +51,12 @@ static void check_views_without_up(VerifyRun *run)
         for (size_t i = 0; i < COUNT_OF(ups); i++) {
             Film image = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
             compare(run, &image, &expected);
-            film_free(&image);
         }
         if (k == 0) {
             // an `up` that is nearly parallel to the view is valid
             Film image = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
             compare(run, &image, &expected);
-            film_free(&image);
         }
-        film_free(&expected);
     }
 }
 
@@ -81,7 +77,6 @@ static void check_tiles(VerifyRun *run)
     }
     run->result->wrong += counts[0] < counts[1] ? counts[0] : counts[1];
     run->result->wrong += counts[0] + counts[1] == 0;
-    film_free(&image);
 }
 
 // Checks fields of view from nearly 0 to nearly 180 degrees, a view far from the origin, and a single pixel.
@@ -93,20 +88,15 @@ static void check_extremes(VerifyRun *run)
     for (size_t i = 0; i < COUNT_OF(fovs); i++) {
         Film image = view(run, here, eye, here, up, fovs[i]);
         run->result->wrong += image.object[middle] != 1 || !(image.color[3 * middle] > 0);
-        film_free(&image);
     }
     Film near = view(run, here, eye, here, up, 40);
     Film away = view(run, far, vector_add(far, eye), far, up, 40);
     for (size_t i = 0; i < film_pixel_count(&near); i++)
         run->result->differing += near.object[i] != away.object[i] || near.t[i] != away.t[i];
-    film_free(&near);
-    film_free(&away);
-    Scene scene = tiled_scene(here);
-    scene.camera = verify_camera(eye, here, 40);
-    Film one = verify_render(run, &scene, true, 1, 1);
+    Scene *scene = tiled_scene(run, here);
+    scene->camera = verify_camera(eye, here, 40);
+    Film one = verify_render(run, scene, true, 1, 1);
     run->result->wrong += one.object[0] != 1 || !(one.color[0] > 0);
-    film_free(&one);
-    scene_free(&scene);
 }
 
 void verify_degenerate_views(VerifyRun *run)

@@ -115,24 +115,22 @@ static void test_ray_print(bool is_double, const Object *objects, size_t count, 
 
 static void case_print(const VerifyRays *set, bool is_double, size_t further)
 {
-    const VerifyRun run = {.tier = is_double ? TIER_D : TIER_C};
-    Scene scene = verify_rays_scene(set);
-    Object *objects = verify_objects(&run, &scene);
+    VerifyRun run = {.tier = is_double ? TIER_D : TIER_C};
+    const Scene *scene = verify_rays_scene(&run, set);
+    Object *objects = verify_objects(&run, scene);
     VerifyTestRays tests = verify_test_rays(&run, set);
     set_print(set->name, is_double);
-    for (size_t i = 0; i < scene.objects.count; i++)
+    for (size_t i = 0; i < scene->objects.count; i++)
         object_print(&objects[i]);
     for (size_t i = 0; i < tests.count; i++)
-        test_ray_print(is_double, objects, scene.objects.count, &tests.items[i]);
+        test_ray_print(is_double, objects, scene->objects.count, &tests.items[i]);
     for (size_t i = tests.count; set->closed && i < further; i++) {
         TraceRay ray = set->family(i);
         verify_round_ray(&run, &ray);
         ray_print(&ray);
         printf("}\n");
     }
-    free(tests.items);
-    free(objects);
-    scene_free(&scene);
+    verify_release(&run);
 }
 
 static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
