@@ -122,7 +122,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
         variant_print(report, i, stream);
         return;
     }
-    const char *clock_fault = bench_clock_fault(&row->times);
+    const char *clock_fault = row->times.clock_fault;
     summary_print(stream, series_summarize(&row->times.frame));
     summary_print(stream, bench_kernel(&row->times));
     fprintf(stream, "  %-5s %4zu", clock_fault ? "host" : "event", row->times.frame.count);
@@ -272,8 +272,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
-    samples_json(json, "kernel_samples_ms",
-                 bench_clock_fault(&row->times) ? &row->times.host : &row->times.event);
+    samples_json(json, "kernel_samples_ms", row->times.clock_fault ? &row->times.host : &row->times.event);
     samples_json(json, "processor_samples_ms", &row->times.processor);
     json_begin_object(json, "drift");
     const Comparison drift = row_drift(report, row);

@@ -148,7 +148,7 @@ void perturb_json(Json *json, uint32_t seed, uint32_t scale)
 
 void times_json(Json *json, const BenchRow *row)
 {
-    const char *clock_fault = bench_clock_fault(&row->times);
+    const char *clock_fault = row->times.clock_fault;
     summary_json(json, "frame_ms", series_summarize(&row->times.frame));
     summary_json(json, "kernel_ms", bench_kernel(&row->times));
     json_text(json, "clock", clock_fault ? "host" : "event");

@@ -61,14 +61,9 @@ void bench_times_free(BenchTimes *times)
     series_free(&times->host);
 }
 
-const char *bench_clock_fault(const BenchTimes *times)
-{
-    return times->clock_fault;
-}
-
 Summary bench_kernel(const BenchTimes *times)
 {
-    return series_summarize(bench_clock_fault(times) ? &times->host : &times->event);
+    return series_summarize(times->clock_fault ? &times->host : &times->event);
 }
 
 static bool is_narrow(const Summary *seconds)
@@ -87,7 +82,7 @@ static const double drift_tolerance = 1.05;
 
 Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
 {
-    const Series *all = is_cpu ? &times->processor : bench_clock_fault(times) ? &times->host : &times->event;
+    const Series *all = is_cpu ? &times->processor : times->clock_fault ? &times->host : &times->event;
     return comparison_of_ends(all, row_count, drift_tolerance);
 }
 

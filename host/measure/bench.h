@@ -16,10 +16,12 @@ typedef struct {
 
 // Times of the runs of one variant. All zeros means no runs.
 typedef struct {
-    Series frame;               // seconds from a run's first enqueue until the host has read its last band
-    Series processor;           // seconds of all processors that this process used during the run
-    Series event, host;         // seconds of a run's launches, by their events and by the host's clock
-    const char *clock_fault;    // why some launch shows that the events' times are unreliable, or NULL
+    Series frame;       // seconds from a run's first enqueue until the host has read its last band
+    Series processor;   // seconds of all processors that this process used during the run
+    Series event, host; // seconds of a run's launches, by their events and by the host's clock
+    // Why the host's clock times the launches, or NULL if their events do. Every event then agreed with the
+    // host's clock, and the device's clock did not drift from it over all runs.
+    const char *clock_fault;
     double run_event, run_host; // sums over the current run
     // Extremes over the launches so far of the device's clock minus the host's, if the device's ran 1%
     // faster or slower.
@@ -31,11 +33,7 @@ void bench_add_launch(BenchTimes *times, const LaunchTime *launch);
 void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds);
 void bench_times_free(BenchTimes *times);
 
-// Returns why the host's clock times the launches, or NULL if their events do: every event agreed with the
-// host's clock, and the device's clock did not drift from it over all runs.
-const char *bench_clock_fault(const BenchTimes *times);
-// Returns the summary of the runs' launch times, by events or by the host's clock as bench_clock_fault
-// decides.
+// Returns the summary of the runs' launch times, by the host's clock if the events have a fault.
 Summary bench_kernel(const BenchTimes *times);
 // Returns whether the times have converged: there are at least `enough` runs, and the interquartile range is
 // small.
