@@ -20,5 +20,5 @@ void interrupts_release(void);
 void interrupts_set_source(bool (*source)(void *context), void *context);
 
 bool is_interrupted(void);
-// A renderer's `stop` function. Returns is_interrupted() and ignores the context.
+// Returns is_interrupted() for a `stop` function, and ignores its context.
 bool interrupts_stop(void *context);

@@ -1,6 +1,5 @@
-// Measures the differences of an image from a reference by cause: another object, another shadow, another
-// path, or different numbers where these three agree. Works on plain arrays. docs/accuracy.md defines every
-// figure.
+// Measures the differences of an image from a reference by cause, which is another object, another shadow,
+// another path, or different numbers where these three agree. docs/accuracy.md defines every figure.
 #pragma once
 
 #include "host/image/image_metrics.h"
@@ -11,8 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// The edges, where a rounding decides what a pixel shows: the pixels whose value differs from that of one of
-// their 4 neighbors, and the pixels around them. Maps of AOVs that the film lacks are NULL.
+// The edges, where a rounding decides what a pixel shows. These are the pixels whose value differs from that
+// of one of their 4 neighbors, and the pixels around them. Maps of AOVs that the film lacks are NULL.
 typedef struct {
     bool *silhouette, *shadow, *path; // the shadow map is laid out as in the film, with values per light
     size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow_edge_pixels has a count per light

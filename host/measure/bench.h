@@ -1,4 +1,4 @@
-// Measures how fast one variant renders one scene: the times of repeated runs, and the figures that follow
+// Measures how fast one variant renders one scene, by the times of repeated runs and the figures that follow
 // from them.
 #pragma once
 
@@ -35,8 +35,8 @@ void bench_times_free(BenchTimes *times);
 
 // Returns the summary of the runs' launch times, by the host's clock if the events have a fault.
 Summary bench_kernel(const BenchTimes *times);
-// Returns whether the times have converged: there are at least `enough` runs, and the interquartile range is
-// small.
+// Returns whether the times have converged, so that there are at least `enough` runs and the interquartile
+// range is small.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
 // Compares the last runs with the first (comparison_of_ends), which detects throttled devices. Uses the

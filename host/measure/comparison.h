@@ -39,8 +39,8 @@ size_t comparison_pairs_at_look(size_t look, size_t row_count);
 Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, size_t look, size_t row_count,
                                double tolerance);
 
-// Returns the logarithm of new over old time of one pair: the median over its rounds, in each of which both
-// ran.
+// Returns the logarithm of new over old time of one pair, as the median over its rounds, in each of which
+// both ran.
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds);
 
 // The times that one report has for a row, by one clock. Run i took frame[i], immediately after the

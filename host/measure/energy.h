@@ -1,5 +1,5 @@
-// Reads the energy that a device has used: of NVIDIA's boards by NVML, the driver's library, and of CPUs by
-// the counters of RAPL that Linux shows below /sys/class/powercap, on many systems only to root.
+// Reads the energy that a device has used. NVIDIA's boards report it by NVML, the driver's library, and CPUs
+// by the counters of RAPL that Linux shows below /sys/class/powercap, on many systems only to root.
 #pragma once
 
 #include "host/opencl/device.h"

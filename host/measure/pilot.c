@@ -30,7 +30,7 @@ static RenderSettings squares_of(const RenderSettings *settings, uint32_t cell)
 
 enum { REST_COUNT = 2 };
 
-// Sets `rest` to the part of the image outside the squares: columns at the right, and rows at the bottom.
+// Sets `rest` to the columns at the right and the rows at the bottom that lie outside the squares.
 static void rest_of(const RenderSettings *settings, uint32_t cell, RenderSettings rest[REST_COUNT])
 {
     const uint32_t columns = settings->region_width % cell, rows = settings->region_height % cell;

@@ -2,7 +2,7 @@
 // sparse sample of the image's pixels at each precision, on the device and scene in use, and compares them
 // with `double`.
 //
-// The sample is stratified: one pixel of each square of pixels, at a place that a hash chooses
+// The sample is stratified. It has one pixel of each square of pixels, at a place that a hash chooses
 // (kernels/film.h), and every pixel of the columns at the right and the rows at the bottom that do not fill a
 // square. docs/accuracy.md has the statistics.
 #pragma once

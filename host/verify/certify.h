@@ -1,5 +1,5 @@
-// Compares a sample of an image's pixels with quadruple precision (113 bits) on the scene exactly as its
-// file defines it: objects, shadows, paths and color errors.
+// Compares the objects, shadows, paths and colors of a sample of an image's pixels with quadruple precision
+// (113 bits) on the scene exactly as its file defines it.
 #pragma once
 
 #include "host/render/film.h"
@@ -33,7 +33,7 @@ void certify_sample_close(CertifySample *sample);
 typedef struct {
     size_t compared; // those that the reference decides
     size_t object, shadow, path, color;
-    size_t colors;      // compared: pixels without a texture, right or wrong
+    size_t colors;      // compared, of pixels without a texture, right or wrong
     double right_color; // the largest error of a channel in right pixels
     double wrong_color; // and in wrong pixels
     uint32_t worst[2];  // the pixel with the larger of the two
@@ -52,10 +52,10 @@ typedef struct {
 // Compares a film, which needs AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_FLAG and the color, with the sample.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
 
-// Pixels that an image at `certified` leaves uncertified, classified by cause. Witnessed: one of 16 tries
-// with ray starts and directions off by up to 2^-50, the error of double, gives another answer. Close:
-// otherwise, a deciding quantity may be below 2^-49 relative to the distance, for example where surfaces
-// coincide. The others may be uncertified only because bounds are loose.
+// Pixels that an image at `certified` leaves uncertified, classified by cause. A pixel is witnessed if one of
+// 16 tries with ray starts and directions off by up to 2^-50, the error of double, gives another answer. It
+// is close if otherwise a deciding quantity may be below 2^-49 relative to the distance, for example where
+// surfaces coincide. The others may be uncertified only because bounds are loose.
 typedef struct {
     size_t count, examined, witnessed, close;
 } CertifyUncertified;

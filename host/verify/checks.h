@@ -26,12 +26,11 @@ ReferenceRay verify_reference_ray(const TraceRay *ray);
 
 // Returns whether the ray must hit or miss exactly as the reference does, however near the boundary.
 bool verify_is_decided(const VerifyRun *run, const VerifyTestRay *test);
-// The tier's requirements for a ray and an object: the exact hit, or the tangent that counts as one, whether
-// the margin permits both hit and miss, and the permitted error of t in units of t.
+// The tier's requirements for a ray and an object.
 typedef struct {
-    ReferenceHit exact;
-    bool open;
-    double bound;
+    ReferenceHit exact; // or the tangent that counts as a hit
+    bool open;          // whether the margin permits both hit and miss
+    double bound;       // of the error of t, in units of t
 } VerifyExpected;
 
 VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyTestRay *test,

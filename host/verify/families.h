@@ -9,8 +9,9 @@
 
 typedef TraceRay (*RayFamily)(uint64_t index);
 
-// Counter-based random numbers in dimension `dimension`, 0 to 31, of sample `index` of sequence `seed`: from
-// 0 to 1, from -1 to 1, a point of the cube from -1 to 1 and a unit vector (these two of three dimensions).
+// Return counter-based random numbers in dimension `dimension`, 0 to 31, of sample `index` of sequence
+// `seed`. They are a number from 0 to 1, one from -1 to 1, a point of the cube from -1 to 1 and a unit
+// vector. The last two use three dimensions.
 double random_at(unsigned seed, uint64_t index, unsigned dimension);
 double random_symmetric(unsigned seed, uint64_t index, unsigned dimension);
 Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension);

@@ -161,7 +161,8 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
     }
 }
 
-// Returns the scene without checkers: an edge of squares belongs to one, and in the mirror to the other.
+// Returns the scene without checkers, because an edge of squares belongs to one, and in the mirror to the
+// other.
 static Scene *unchecked_scene(VerifyRun *run)
 {
     Scene *scene = every_shape_scene(run);

@@ -12,10 +12,10 @@ typedef struct {
     double within[TIER_COUNT]; // in units of t; takes precedence over ulps
 } VerifyLimits;
 
-#define EXACTLY (-1.0) // ulps: none
+#define EXACTLY (-1.0) // as ulps, permits no error
 
-// A ray in decimal numbers, each rounded once to the precision. It stands for up to five rays: itself and,
-// for the x of its origin and that of its direction, the next number farther from 0 and the next one nearer.
+// A ray in decimal numbers, each rounded once to the precision. It stands for itself and for up to four
+// neighbors, with the next number farther from 0 or nearer to it as the x of its origin or of its direction.
 typedef struct {
     Vector3 origin, direction;
     double tmin;
@@ -31,7 +31,7 @@ typedef struct {
     const VerifyRay *rays; // NULL for a family's first ray_count rays
     RayFamily family;
     size_t ray_count;
-    size_t checked_count; // of a family: rays with exact answers; all have their points and normals checked
+    size_t checked_count; // a family's rays with exact answers; all have their points and normals checked
     bool closed;          // every ray of the family hits something
     // The tiers, as in "BCD", that require the exact hit or miss, however near the boundary. For a table of
     // rays this excludes the neighbors.

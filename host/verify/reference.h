@@ -17,7 +17,7 @@ typedef struct {
 
 typedef struct {
     bool found;
-    uint32_t object; // UINT32_MAX: a miss
+    uint32_t object; // UINT32_MAX on a miss
     Quad t;
     Quad3 normal;          // geometric, unit, facing the ray
     Quad3 shading_normal;  // on the same side; differs on smooth triangles
@@ -72,8 +72,8 @@ typedef struct {
     // Around the center; 0 if unbounded, the radius for an infinite cylinder. Used in the bounds of t and of
     // points.
     double bounding_radius;
-    // The smallest radius that decides hit or miss: the tube's for a torus, 0 for a plane. Determines the
-    // band in which both are permitted.
+    // The smallest radius that decides hit or miss, such as the tube's of a torus; 0 for a plane. Determines
+    // the band in which both are permitted.
     double feature_radius;
     // By how many roundings the normal turns as the object's numbers are rounded. For the bound of normals.
     double normal_condition;

@@ -15,7 +15,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     return shaded_color(&world, &surface, (double)hit.margin, NULL);
 }
 
-// The medium of a ray: how strongly the body around it, and the one around that, absorb light.
+// How strongly the body around a ray, and the one around that, absorb light.
 typedef struct {
     Color density, outer;
 } Medium;
@@ -23,7 +23,7 @@ typedef struct {
 // A ray of a tree, the object that it leaves, and the part of its light that reaches the eye.
 typedef struct {
     ReferenceRay ray;
-    uint32_t left; // UINT32_MAX: none
+    uint32_t left; // UINT32_MAX for the eye
     Color weight;
     Medium medium;
 } PathRay;

@@ -1,5 +1,6 @@
-// Computes the exact color along a ray in quadruple precision: shading, shadows, reflections and refractions
-// over the closest hits of host/verify/reference.h. `glint certify` and tests compare images with it.
+// Computes the exact color along a ray in quadruple precision, with shading, shadows, reflections and
+// refractions over the closest hits of host/verify/reference.h. `glint certify` and tests compare images with
+// it.
 #pragma once
 
 #include "host/verify/reference_scene.h"
@@ -10,8 +11,9 @@ typedef struct {
     double margin; // the least of the eye's ray, the shadow rays and a checker's edges
 } ReferenceColor;
 
-// Returns the color seen along a ray: background, or ambient and Phong with shadows, without reflection and
-// refraction. A transparent object passes its part of the light undeflected, once per object.
+// Returns the color seen along a ray without reflection and refraction, which is the background, or ambient
+// light and Phong's with shadows. A transparent object passes its part of the light undeflected, once per
+// object.
 ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
 
 // Settings for reflections and refractions, with `bounce_count` of them in a row.

@@ -15,7 +15,7 @@ void reference_scene_close(ReferenceScene *scene);
 
 // Returns the hit of one object, or a miss if its bounding sphere is missed. `left` is the object on whose
 // surface the ray starts, UINT32_MAX for the eye. A start on a surface does not hit that surface or one that
-// coincides with it: the start's height over a hit's tangent plane must exceed ray->tmin times the
+// coincides with it, because the start's height over a hit's tangent plane must exceed ray->tmin times the
 // direction's length. The margin of `left`, which is 0 although nothing is uncertain, is ignored.
 ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray,
                                         uint32_t left);

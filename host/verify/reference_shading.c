@@ -1,6 +1,6 @@
 // Evaluates the shading formulas of docs/scene-format.md as written. The kernels (kernels/shading/) compute
-// the same in forms suited to float: 1 minus the cosine of a highlight or of a spot light's cone is half the
-// squared difference of two unit vectors, and lights that cannot reach a surface are culled.
+// the same in forms suited to float. There 1 minus the cosine of a highlight or of a spot light's cone is
+// half the squared difference of two unit vectors, and lights that cannot reach a surface are culled.
 #include "host/verify/reference_shading.h"
 
 #include <float.h>

@@ -1,5 +1,5 @@
-// The color of a surface in quadruple precision: a checker's squares, Phong's reflection of the lights, and
-// the objects that occlude them.
+// The color of a surface in quadruple precision, from a checker's squares, Phong's reflection of the lights
+// and the objects that occlude them.
 #pragma once
 
 #include "host/verify/random_shape.h"

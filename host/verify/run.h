@@ -47,7 +47,7 @@ void *verify_allocate(VerifyRun *run, size_t count, size_t size);
 // Ends a case, and frees what it has allocated.
 void verify_release(VerifyRun *run);
 
-// Returns how many of `count` random rays or pixels to use: all, or a sixteenth in a quick run.
+// Returns how many of `count` random rays or pixels to use, which is a sixteenth in a quick run.
 size_t verify_part(const VerifyRun *run, size_t count);
 
 double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1

@@ -1,4 +1,4 @@
-// Images of shadows: lit surfaces must have none, and no shadow may be missing.
+// Images of lit surfaces, which must have no shadow, and of shadows, of which none may be missing.
 #include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>

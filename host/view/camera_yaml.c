@@ -22,7 +22,7 @@ void vector_write_yaml(Text *text, Vector3 v)
     list_write(text, &v.x, 3);
 }
 
-// Writes a member of the camera: a number, or a list if `count` is above 1.
+// Writes a member of the camera, whose value is a list if `count` is above 1.
 static void member_write(Text *text, const char *name, const double *values, size_t count)
 {
     const bool is_first = text->items[text->count - 1] == '{';

@@ -5,8 +5,8 @@
 //     frame_loop_close.
 //  2. The loop's thread alone accesses the members of FrameLoop that it owns. `options` are constant.
 //  3. Everything allocated has one owner. Publishing moves a text to `shared`, and acquiring moves it out. A
-//     frame is exchanged for another: of the three, the loop fills one, `shared` has the newest complete one,
-//     and the window shows the third.
+//     frame is exchanged for another. The loop fills the first of three, `shared` has the newest complete
+//     one, and the window shows the third.
 //  4. Requests are numbered from 1. A request replaces one that was not read. `current_number` is that of the
 //     last one read, and a frame has the number of the request that it shows.
 //  5. `has_news` is set, with the mutex, by each request and each change of a file, and is cleared when both

@@ -1,4 +1,4 @@
-// Fills the frame of a film: its display values, its distances and the report on its rendering.
+// Fills a frame with a film's display values, its distances and the report on its rendering.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/memory.h"

@@ -1,6 +1,6 @@
-// Renders what the window shows on a separate thread: coarse frames while the camera moves, and at rest the
-// image in passes until it has all samples. A new request ends the work on the previous one. The scene is
-// re-read when its files change and for another frame of an animation.
+// Renders what the window shows on a separate thread. While the camera moves, it renders coarse frames, and
+// at rest the image in passes until it has all samples. A new request ends the work on the previous one. The
+// scene is re-read when its files change and for another frame of an animation.
 #pragma once
 
 #include "host/image/image.h"
@@ -42,12 +42,12 @@ typedef struct {
     unsigned number; // of the request
     uint32_t width, height;
     uint8_t *pixels; // display values, RGB, from the top left
-    // The distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known
-    // yet.
+    // The distance from the eye to each pixel's hit point, infinite where nothing is hit, or NULL until it is
+    // known.
     float *distances;
-    uint32_t samples;     // per pixel; 0: a coarse frame
-    double largest_error; // of a heat map of errors; negative for other frames
-    char *summary;        // lines of text: device, precision, samples, times
+    uint32_t samples;     // per pixel, or 0 for a coarse frame
+    double largest_error; // of a heat map of errors, or negative for another frame
+    char *summary;        // lines with the device, the precision, the samples and the times
 } Frame;
 
 void frame_free(Frame *frame); // and zeroes
@@ -101,8 +101,8 @@ typedef struct {
     Camera camera;        // the scene's own
     bool has_new_camera;  // differs from the previous one of the same frame, or is the first
     uint32_t frame;       // of the animation
-    uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
-    double frame_rate;    // 0: not given
+    uint32_t frame_count; // 0 if it is not given or if the file cannot be re-read, as standard input
+    double frame_rate;    // 0 if it is not given
 } SceneUpdate;
 // Sets `update` to the scene. Returns false if none was read or refused since the last call.
 bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update);

@@ -70,8 +70,8 @@ struct FrameLoop {
     Watch *watch;
     RenderSettings settings;
     Compute compute;
-    Renderer *renderer;  // NULL: not open, or failed
-    Renderer *reference; // in double, for the error view; NULL: not open
+    Renderer *renderer;  // NULL if it is not open or has failed
+    Renderer *reference; // in double, for the error view, or NULL
     FrameRequest current;
     unsigned current_number;
     double move_seconds, render_start;

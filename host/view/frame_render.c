@@ -1,4 +1,4 @@
-// Renders requests: a coarse frame while the camera moves, then the image in passes.
+// Renders a coarse frame for each request of a moving camera, and then the image in passes.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/clock.h"

@@ -13,6 +13,6 @@ typedef struct {
 } PixelView;
 
 // Traces the ray through the center of a pixel and its tree of reflected and refracted rays. Returns a line
-// per ray: the object, its place in the scene's file, its material and t; for the first ray also hit point
-// and normal. A failure of the device ends the text. The caller frees it.
+// per ray with the object, its place in the scene's file, its material and t. The first ray has a second line
+// with the hit point and the normal. A failure of the device ends the text. The caller frees it.
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y);

@@ -4,7 +4,7 @@
 #include "host/image/image.h"
 #include "host/render/film.h"
 
-// VIEW(NAME, name, aovs): `aovs` are those that it shows in addition to the color.
+// VIEW(NAME, name, aovs), whose `aovs` are those that it shows in addition to the color.
 #define VIEW_LIST(VIEW)                                                                                      \
     VIEW(COLOR, "color", 0)                                                                                  \
     VIEW(DEPTH, "depth", AOV_T | AOV_OBJECT)                                                                 \
@@ -22,8 +22,9 @@ extern const unsigned view_aovs[VIEW_COUNT];
 // Sets display values (RGB) from a film's color, which is the sum of `sample_count` samples.
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer);
 
-// Sets display values of the view's AOVs: depth as 1 / (1 + (t / distance_half)^2); normals from -1..1 to
-// 0..1 per axis; a random color for each object; the share of lights that are not occluded. A miss is black.
+// Sets display values of the view's AOVs. Depth is shown as 1 / (1 + (t / distance_half)^2), a normal as
+// 0..1 for -1..1 per axis, an object as a random color, and shadows as the share of lights that are not
+// occluded. A miss is black.
 void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
 
 // The error that is white in the heat map of errors.

@@ -240,8 +240,8 @@ static bool display_exists(void)
     return strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0;
 }
 
-// Returns the scale of text: the pixels per point of the window or, if that is 1, as on X11, a larger one on
-// a display of many pixels per inch.
+// Returns the pixels per point of the window as the scale of text. If that is 1, as on X11, the scale is
+// larger on a display of many pixels per inch.
 static float text_scale(const Window *window, ImageSize size)
 {
     const float pixels = (float)window->wanted.size.width / (float)size.width, usual_dpi = 96;

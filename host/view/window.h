@@ -5,13 +5,13 @@
 
 typedef struct {
     FrameLoopOptions frames;     // all but notify
-    ImageSize size;              // of the window, reduced to fit the display; 0: the scene's own
+    ImageSize size;              // of the window, reduced to fit the display, or 0 for the scene's own
     bool (*stop)(void *context); // returns true to end it, at an interrupt
     void *stop_context;
 } WindowOptions;
 
 typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT, WINDOW_REFUSED } WindowEnd;
 
-// Opens the window and returns when it is closed. WINDOW_ABSENT: it cannot be opened. WINDOW_REFUSED: the
-// scene's file has a mistake. In both cases the reason was printed.
+// Opens the window and returns when it is closed. Returns WINDOW_ABSENT if it cannot be opened and
+// WINDOW_REFUSED if the scene's file has a mistake, with the reason printed.
 WindowEnd window_run(const WindowOptions *options);

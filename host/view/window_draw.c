@@ -1,4 +1,4 @@
-// Draws the window: the frame, and text over it.
+// Draws the frame, and text over it.
 #include "host/base/array.h"
 #include "host/view/window_state.h"
 
@@ -17,7 +17,7 @@ static void title_set(const Window *window)
     const uint32_t count =
         window->wanted.view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
     Text title = {0};
-    // ASCII: in the C locale SDL sets no other title
+    // only ASCII, because in the C locale SDL sets no other title
     text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->wanted.view],
                  precision_names[window->wanted.precision], window->wanted.size.width,
                  window->wanted.size.height);

@@ -60,7 +60,7 @@ typedef struct {
     Play play;
     PixelFacts facts;
     char *message; // at the bottom, until the next key
-    Text stage;    // what keeps the next frame waiting; empty: not shown
+    Text stage;    // what keeps the next frame waiting, or empty
     bool shows_help, shows_times, redraws, closes;
 } Window;
 

@@ -4,8 +4,8 @@
 
 #include <math.h>
 
-// A cylinder or cone: radius `base` at `from`, growing by `slope` along the unit axis, up to `height` if it
-// is finite; an infinite cone has both nappes.
+// A cylinder or cone, whose radius is `base` at `from` and grows by `slope` along the unit axis, up to
+// `height` if it is finite. An infinite cone has both nappes.
 typedef struct {
     Quad3 from, axis;
     Quad base, slope, height;
