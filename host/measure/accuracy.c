@@ -97,21 +97,17 @@ typedef struct {
     float *t_relative, *t_ulps, *normal;
 } FilmComparison;
 
-// Returns the channel in which a pixel's colors differ most.
-static size_t worst_channel(const FilmComparison *comparison, size_t pixel)
+// Returns the error of the channel in which a pixel's colors differ most, and its values.
+static AccuracyWorst color_error(const FilmComparison *comparison, size_t pixel)
 {
-    const double *reference = comparison->reference->color + 3 * pixel;
-    const double *variant = comparison->variant->color + 3 * pixel;
-    size_t worst = 0;
-    for (size_t i = 1; i < 3; i++)
-        if (value_error(reference[i], variant[i]) > value_error(reference[worst], variant[worst])) worst = i;
+    AccuracyWorst worst = {.error = -1};
+    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
+        const double reference = comparison->reference->color[i], variant = comparison->variant->color[i];
+        const double error = value_error(reference, variant);
+        if (error > worst.error)
+            worst = (AccuracyWorst){.error = error, .reference = reference, .variant = variant};
+    }
     return worst;
-}
-
-static double color_error(const FilmComparison *comparison, size_t pixel)
-{
-    size_t value = 3 * pixel + worst_channel(comparison, pixel);
-    return value_error(comparison->reference->color[value], comparison->variant->color[value]);
 }
 
 // Keeps the error if it is the worst of its type so far. An error away from edges is worse than any at edges.
@@ -142,7 +138,7 @@ static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, 
     worst_record(comparison, type, pixel,
                  &(AccuracyWorst){.away = !edge,
                                   .light = light,
-                                  .error = color_error(comparison, pixel),
+                                  .error = color_error(comparison, pixel).error,
                                   .reference = values[0],
                                   .variant = values[1]});
 }
@@ -203,10 +199,7 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
 
 static void color_error_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
 {
-    const size_t value = 3 * pixel + worst_channel(comparison, pixel);
-    AccuracyWorst candidate = {.error = color_error(comparison, pixel),
-                               .reference = comparison->reference->color[value],
-                               .variant = comparison->variant->color[value]};
+    const AccuracyWorst candidate = color_error(comparison, pixel);
     if (candidate.error > 0) worst_record(comparison, type, pixel, &candidate);
 }
 
