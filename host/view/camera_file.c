@@ -197,23 +197,19 @@ static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, con
 static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn,
                         bool is_recorded)
 {
-    const bool is_moved = !vectors_equal(old->position, camera->position) ||
-                          !vectors_equal(old->look_at, camera->look_at) ||
-                          !vectors_equal(old->up, camera->up);
-    const struct {
-        const char *name;
-        Vector3 old, new;
-    } members[] = {{"position", old->position, camera->position},
-                   {"look_at", old->look_at, camera->look_at},
-                   {"up", old->up, camera->up}};
-    for (size_t i = 0; i < COUNT_OF(members); i++)
-        if (strcmp(key, members[i].name) == 0) {
-            if (!is_recorded && vectors_equal(members[i].old, members[i].new) &&
-                !(i == 0 && is_moved && has_turn))
-                return false;
-            vector_write_yaml(text, members[i].new);
-            return true;
-        }
+    static const char *const names[] = {"position", "look_at", "up"};
+    const Vector3 before[] = {old->position, old->look_at, old->up},
+                  after[] = {camera->position, camera->look_at, camera->up};
+    bool is_moved = false;
+    for (size_t i = 0; i < COUNT_OF(names); i++)
+        is_moved |= !vectors_equal(before[i], after[i]);
+    for (size_t i = 0; i < COUNT_OF(names); i++) {
+        if (strcmp(key, names[i]) != 0) continue;
+        const bool had_turn = i == 0 && is_moved && has_turn;
+        if (!is_recorded && !had_turn && vectors_equal(before[i], after[i])) return false;
+        vector_write_yaml(text, after[i]);
+        return true;
+    }
     if (is_moved && strcmp(key, "turn") == 0) {
         number_write_yaml(text, 0);
         return true;
