@@ -1,16 +1,10 @@
 // Draws the frame, and text over it.
-#include "host/base/array.h"
 #include "host/view/window_state.h"
 
 #include "host/view/keys.h"
 #include "host/view/legend.h"
 
 static const double STAGE_SECONDS = 0.3; // shorter stages are not shown
-
-#define HELP_ROW(input, effect) {input, effect},
-static const struct {
-    const char *input, *effect;
-} help_rows[] = {VIEW_KEY_LIST(HELP_ROW)};
 
 static void title_set(const Window *window)
 {
@@ -66,8 +60,9 @@ void stage_show(Window *window)
 static void help_draw(const Window *window)
 {
     Text help = {0};
-    for (size_t i = 0; i < COUNT_OF(help_rows); i++)
-        text_appendf(&help, "%s%-12s  %s", i > 0 ? "\n" : "", help_rows[i].input, help_rows[i].effect);
+#define HELP_LINE(input, effect) text_appendf(&help, "%s%-12s  %s", help.count ? "\n" : "", input, effect);
+    VIEW_KEY_LIST(HELP_LINE)
+#undef HELP_LINE
     caption_draw(window->screen.caption, CAPTION_TOP, text_c(&help));
     text_free(&help);
 }
