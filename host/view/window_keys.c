@@ -155,6 +155,7 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_3:
     case SDLK_4:
         wanted->precision = (Precision)(event->keysym.sym - SDLK_1);
+        window->sent.precision = PRECISION_COUNT; // the reason is repeated if the device lacks the precision
         break;
     case SDLK_t:
         window->shows_times = !window->shows_times;
