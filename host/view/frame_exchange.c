@@ -73,16 +73,6 @@ static void shared_signal(FrameLoop *loop)
     shared_unlock(loop);
 }
 
-// Moves a text of the shared state to the caller and sets it to NULL.
-static char *text_acquire(FrameLoop *loop, char **text)
-{
-    shared_lock(loop);
-    char *taken = *text;
-    *text = NULL;
-    shared_unlock(loop);
-    return taken;
-}
-
 // The loop's thread.
 
 bool render_stops(void *context)
@@ -147,7 +137,11 @@ bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
 
 char *save_path_acquire(FrameLoop *loop)
 {
-    return text_acquire(loop, &loop->shared.save_path);
+    SharedState *shared = shared_lock(loop);
+    char *path = shared->save_path;
+    shared->save_path = NULL;
+    shared_unlock(loop);
+    return path;
 }
 
 static bool texts_equal(const Text *a, const Text *b)
@@ -294,39 +288,20 @@ void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
     shared_signal(loop);
 }
 
-char *frame_loop_acquire_facts(FrameLoop *loop)
-{
-    return text_acquire(loop, &loop->shared.facts);
-}
-
-char *frame_loop_acquire_message(FrameLoop *loop)
-{
-    return text_acquire(loop, &loop->shared.message);
-}
-
-bool frame_loop_acquire(FrameLoop *loop, Frame *frame)
+LoopNews frame_loop_acquire(FrameLoop *loop, Frame *frame, SceneUpdate *scene)
 {
     SharedState *shared = shared_lock(loop);
-    const bool is_new = shared->has_ready;
-    if (is_new) {
+    const LoopNews news = {shared->has_ready, shared->has_update, shared->facts, shared->message};
+    if (news.has_frame) {
         const Frame shown = *frame;
         *frame = shared->ready;
         shared->ready = shown;
-        shared->has_ready = false;
     }
+    if (news.has_scene) *scene = shared->update;
+    shared->has_ready = shared->has_update = shared->update.has_new_camera = false;
+    shared->facts = shared->message = NULL;
     shared_unlock(loop);
-    return is_new;
-}
-
-bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
-{
-    SharedState *shared = shared_lock(loop);
-    const bool is_new = shared->has_update;
-    shared->has_update = false;
-    if (is_new) *update = shared->update;
-    shared->update.has_new_camera = false;
-    shared_unlock(loop);
-    return is_new;
+    return news;
 }
 
 static void camera_exchange(SharedState *shared, Text *text, Camera *camera)

@@ -78,18 +78,13 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
 // Asks for the color of the last request's image to be saved when it is complete.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
-// Asks what a pixel of the last request's image sees. frame_loop_acquire_facts returns the answer.
+// Asks what a pixel of the last request's image sees. The answer is among the loop's news.
 void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y);
-// Returns the answer to the last question, or NULL if none came since the last call. The caller frees it.
-char *frame_loop_acquire_facts(FrameLoop *loop);
 
 // Writes the camera into the scene's file, which is not re-read because of that. With a `frame`, writes keys
 // there. Returns false with messages if it cannot.
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32_t *frame,
                              MessageList *messages);
-
-// Exchanges `frame` for the newest one. Returns false if there is none since the last call.
-bool frame_loop_acquire(FrameLoop *loop, Frame *frame);
 
 // A scene is refused if its file has a mistake, which the message states, and no scene was read before.
 typedef enum { SCENE_LOADING, SCENE_LOADED, SCENE_REFUSED } SceneState;
@@ -104,8 +99,14 @@ typedef struct {
     uint32_t frame_count; // 0 if it is not given or if the file cannot be re-read, as standard input
     double frame_rate;    // 0 if it is not given
 } SceneUpdate;
-// Sets `update` to the scene. Returns false if none was read or refused since the last call.
-bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update);
-// Returns the messages since the last call, about mistakes, failures and saved images. Returns "" if a
-// mistake was fixed, and NULL if there are no messages. The caller frees them.
-char *frame_loop_acquire_message(FrameLoop *loop);
+
+// What has changed since the last call of frame_loop_acquire.
+typedef struct {
+    bool has_frame, has_scene;
+    char *facts;   // the answer to the last question, or NULL
+    char *message; // messages about mistakes, failures and saved images, "" if a mistake was fixed, or NULL
+} LoopNews;
+
+// Exchanges `frame` for the newest one, and sets `scene` to the scene that was read or refused last, if they
+// are new. The caller frees the texts.
+LoopNews frame_loop_acquire(FrameLoop *loop, Frame *frame, SceneUpdate *scene);

@@ -50,8 +50,8 @@ void request_send(Window *window)
     window->sent = *wanted;
 }
 
-// Asks for the facts of the pixel under the cursor, if they are shown, and takes them.
-static void facts_exchange(Window *window)
+// Asks for the facts of the pixel under the cursor, if they are shown.
+static void facts_request(Window *window)
 {
     const double *at = window->facts.at;
     const ImageSize size = window->wanted.size;
@@ -60,8 +60,10 @@ static void facts_exchange(Window *window)
         frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
         window->facts.needs_probe = false;
     }
-    char *facts = frame_loop_acquire_facts(window->frames);
-    if (!facts) return;
+}
+
+static void facts_show(Window *window, char *facts)
+{
     if (window->facts.prints_next) fputs(facts, stdout);
     fflush(stdout);
     window->facts.prints_next = false;
@@ -126,10 +128,8 @@ static void event_handle(Window *window, const SDL_Event *event)
     }
 }
 
-static void message_acquire(Window *window)
+static void message_receive(Window *window, char *message)
 {
-    char *message = frame_loop_acquire_message(window->frames);
-    if (!message) return;
     size_t length = strlen(message);
     if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
     if (length > 0)
@@ -155,12 +155,13 @@ static void scene_size_set(Window *window)
     size_read(window);
 }
 
-static void scene_acquire(Window *window)
+static void scene_receive(Window *window, const SceneUpdate *scene)
 {
-    const SceneUpdate old = window->scene, *scene = &window->scene;
+    const SceneUpdate old = window->scene;
     FrameRequest *wanted = &window->wanted;
     const bool follows = cameras_equal(&wanted->camera, &old.camera);
-    if (!frame_loop_acquire_scene(window->frames, &window->scene) || scene->state == SCENE_REFUSED) return;
+    window->scene = *scene;
+    if (scene->state == SCENE_REFUSED) return;
     if (old.state == SCENE_LOADING) scene_size_set(window);
     if (follows || scene->has_new_camera) wanted->camera = scene->camera;
     // the loop moves the camera of a request that follows the scene
@@ -174,16 +175,19 @@ static void scene_acquire(Window *window)
 
 static void work_exchange(Window *window)
 {
-    scene_acquire(window);
+    SceneUpdate scene;
+    const LoopNews news = frame_loop_acquire(window->frames, &window->frame, &scene);
+    if (news.has_scene) scene_receive(window, &scene);
     key_record(window);
     request_send(window);
-    if (frame_loop_acquire(window->frames, &window->frame)) {
+    if (news.has_frame) {
         window->facts.needs_probe |= window->frame.number != window->facts.request;
         window->facts.request = window->frame.number;
         frame_show(window);
     }
-    facts_exchange(window);
-    message_acquire(window);
+    facts_request(window);
+    if (news.facts) facts_show(window, news.facts);
+    if (news.message) message_receive(window, news.message);
     stage_show(window);
 }
 
