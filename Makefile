@@ -233,12 +233,11 @@ test:
 # For the comparison with other programs alone; needs libembree-dev.
 embree_sources := $(wildcard tools/peers/embree/*.c)
 embree_headers := $(wildcard tools/peers/embree/*.h)
-glint_for_embree := host/render/sample_pattern.c host/base/memory.c host/base/fault.c
 
-$(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(glint_for_embree) Makefile
+$(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a
 	@mkdir -p $(@D)
 	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp-simd $(embree_sources) \
-	    $(glint_for_embree) -lembree3 -lm -lpthread -o $@
+	    $(BUILD)/tests.a -lembree3 $(LIBS) -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
 # installed (docs/performance.md), five minutes of a machine that does nothing else.
