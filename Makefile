@@ -274,12 +274,11 @@ CLANG_TIDY   ?= clang-tidy
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 LINT_FAST    ?= # 1 omits clang's static analyzer and cppcheck, which take most of the time
-for_embree := $(embree_sources) tools/peers/hard-cases.c
 linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/measure/features.c tools/kernels/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
-          $(if $(has_embree),$(for_embree)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
+          $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h tests/failing/*.h) $(for_embree) $(embree_headers) docs/example.c
+             tests/oracle/*.h tests/failing/*.h) $(embree_sources) $(embree_headers) docs/example.c
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)

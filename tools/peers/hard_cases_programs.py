@@ -1,10 +1,13 @@
 """Traces rays with other programs, for tools/peers/hard-cases."""
+import ctypes
+import itertools
+import math
 import pathlib
 import shutil
+import struct
 import subprocess
 import tempfile
-
-SOURCE = pathlib.Path(__file__).with_name("hard-cases.c")
+from array import array
 
 
 class NotModelled(Exception):
@@ -22,49 +25,85 @@ def box_triangles(low, high):
         yield corners[a], corners[c], corners[d]
 
 
+# Values of enumerations in rtcore_geometry.h, rtcore_buffer.h and rtcore_scene.h. A format also has its number of components.
+TRIANGLE, CONE_LINEAR_CURVE, SPHERE_POINT, ORIENTED_DISC_POINT = 0, 15, 50, 52
+INDEX, VERTEX, NORMAL = 0, 1, 3
+FORMATS = {"I": 0x5000, "f": 0x9000}
+QUALITY_HIGH, FLAG_ROBUST, INVALID_ID = 2, 4, 2**32 - 1
+RAY_HIT = struct.Struct("9f3I5f3I")  # struct RTCRayHit
+
+
+class Handle(ctypes.c_void_p):
+    """An object of Embree. ctypes keeps results of a subclass as pointers."""
+
+
 class Embree:
+    """Embree by its C interface, which returns the object and its distance for single rays."""
     takes_starts = tells_distance = is_cheap = has_boxes_of_triangles = True
 
-    def __init__(self, folder, flag):
-        self.program, self.flag = pathlib.Path(folder) / "hard-cases", flag
-        self.name = "Embree" if flag == "robust" else "Embree without its robust flag"
-        self.version = "Embree " + version_of("libembree-dev")
+    def __init__(self, is_robust):
+        self.flags = FLAG_ROBUST * is_robust
+        self.name = "Embree" if is_robust else "Embree without its robust flag"
+        self.version = "Embree " + version_of("libembree3-3")
 
     def is_here(self):
-        if not self.program.exists():
-            command = ["cc", "-std=c11", "-O2", SOURCE, "-lembree3", "-o", self.program]
-            return subprocess.run(command, capture_output=True).returncode == 0
+        try:
+            self.library = ctypes.CDLL("libembree3.so.3")
+        except OSError:
+            return False
+        for name in "rtcNewDevice", "rtcNewScene", "rtcNewGeometry", "rtcSetNewGeometryBuffer":
+            getattr(self.library, name).restype = Handle
         return True
 
-    def part(self, kind, body):
-        def line(word, *vectors):
-            return word + " " + " ".join(float(x).hex() for vector in vectors for x in vector)
-
-        if kind == "sphere":
-            return [line("sphere", body["center"], [body["radius"]])]
-        if kind == "disc":
-            return [line("disc", body["center"], body["normal"], [body["radius"]])]
-        if kind == "triangle":
-            return [line("triangle", *body["vertices"])]
-        if kind == "box":
-            return [line("triangle", *corners) for corners in box_triangles(body["min"], body["max"])]
-        if kind in ("cylinder", "cone") and "from" in body:
-            radii = body["radius"] if kind == "cone" else [body["radius"]] * 2
-            return [line("cone", body["from"], radii[:1], body["to"], radii[1:])]
-        raise NotModelled(f"has no {'infinite ' * (kind == 'cylinder')}{kind}")
+    @staticmethod
+    def geometries(parts):
+        """Returns the types of an object's geometries and their buffers. All triangles form one mesh."""
+        found, vertices, triangles = [], {}, []
+        for kind, body in parts:
+            if kind == "sphere":
+                found.append((SPHERE_POINT, [(VERTEX, "f", [[*body["center"], body["radius"]]])]))
+            elif kind == "disc":
+                found.append((ORIENTED_DISC_POINT, [(VERTEX, "f", [[*body["center"], body["radius"]]]), (NORMAL, "f", [body["normal"]])]))
+            elif kind in ("cylinder", "cone") and "from" in body:
+                first, last = body["radius"] if kind == "cone" else [body["radius"]] * 2
+                found.append((CONE_LINEAR_CURVE, [(VERTEX, "f", [[*body["from"], first], [*body["to"], last]]), (INDEX, "I", [[0]])]))
+            elif kind in ("triangle", "box"):
+                corners = [body["vertices"]] if kind == "triangle" else box_triangles(body["min"], body["max"])
+                triangles += [[vertices.setdefault(tuple(place), len(vertices)) for place in three] for three in corners]
+            else:
+                raise NotModelled(f"has no {'infinite ' * (kind == 'cylinder')}{kind}")
+        return found + [(TRIANGLE, [(VERTEX, "f", list(vertices)), (INDEX, "I", triangles)])] * bool(triangles)
 
     def trace(self, objects, rays):
-        lines = []
-        for parts in objects:
-            lines.append("object")
-            for kind, body in parts:
-                lines += self.part(kind, body)
+        embree, owners = self.library, {}
+        device = embree.rtcNewDevice(b"threads=1")
+        scene = embree.rtcNewScene(device)
+        embree.rtcSetSceneBuildQuality(scene, QUALITY_HIGH)
+        embree.rtcSetSceneFlags(scene, self.flags)
+        for index, parts in enumerate(objects):
+            for kind, buffers in self.geometries(parts):
+                geometry = embree.rtcNewGeometry(device, kind)
+                for use, letter, items in buffers:
+                    content = array(letter, itertools.chain.from_iterable(items)).tobytes()
+                    target = embree.rtcSetNewGeometryBuffer(geometry, use, 0, FORMATS[letter] + len(items[0]),
+                                                            ctypes.c_size_t(4 * len(items[0])), ctypes.c_size_t(len(items)))
+                    ctypes.memmove(target, content, len(content))
+                embree.rtcCommitGeometry(geometry)
+                owners[embree.rtcAttachGeometry(scene, geometry)] = index
+                embree.rtcReleaseGeometry(geometry)
+        embree.rtcCommitScene(scene)
+        memory = ctypes.create_string_buffer(RAY_HIT.size + 16)
+        ray_hit = (ctypes.c_char * RAY_HIT.size).from_buffer(memory, -ctypes.addressof(memory) % 16)  # aligned
+        context = ctypes.create_string_buffer(struct.pack("IPI", 0, 0, INVALID_ID))  # as rtcInitIntersectContext sets it
+        answers = []
         for origin, direction, start in rays:
-            lines.append("ray " + " ".join(float(x).hex() for x in [*origin, *direction, start]))
-        command, text = [self.program, self.flag], "\n".join(lines)
-        run = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
-        answers = [line.split() for line in run.stdout.splitlines()]
-        return [None if words == ["-"] else (int(words[0]), float(words[1])) for words in answers]
+            RAY_HIT.pack_into(ray_hit, 0, *origin, start, *direction, 0, math.inf, INVALID_ID, 0, 0, *[0] * 5, *[INVALID_ID] * 3)
+            embree.rtcIntersect1(scene, context, ray_hit)
+            numbers = RAY_HIT.unpack(ray_hit)
+            answers.append(None if numbers[18] == INVALID_ID else (owners[numbers[18]], numbers[8]))
+        embree.rtcReleaseScene(scene)
+        embree.rtcReleaseDevice(device)
+        return answers
 
 
 class Glint:
