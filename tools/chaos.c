@@ -18,7 +18,6 @@
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
-#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -27,9 +26,7 @@
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
-#include <pthread.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -95,17 +92,18 @@ static void *real(const char *name)
     return function;
 }
 
-// ---- OpenCL: every argument is an integer or a pointer, so one type of function serves for all
-
-typedef long (*ClFunction)(long, long, long, long, long, long, long, long, long, long, long);
+// One type serves for all functions whose arguments are integers or pointers.
+typedef long (*Function)(long, long, long, long, long, long, long, long, long, long, long);
 #define PARAMETERS long a, long b, long c, long d, long e, long f, long g, long h, long i, long j, long k
 #define ARGUMENTS  a, b, c, d, e, f, g, h, i, j, k
+
+// ---- OpenCL
 
 enum { CL_OUT_OF_RESOURCES = -5 };
 
 // Calls an OpenCL function or makes it fail. `status` points to its error code, or is NULL if it returns
 // that.
-static long cl_call(const char *name, long *status, bool is_release, ClFunction function, PARAMETERS)
+static long cl_call(const char *name, long *status, bool is_release, Function function, PARAMETERS)
 {
     if (status && count_fails("null", &null_count, name)) {
         *(int *)status = 0;
@@ -124,8 +122,8 @@ static long cl_call(const char *name, long *status, bool is_release, ClFunction 
 #define CL(name, status, is_release)                                                                         \
     long name(PARAMETERS)                                                                                    \
     {                                                                                                        \
-        static ClFunction function;                                                                          \
-        if (!function) function = (ClFunction)real(#name);                                                   \
+        static Function function;                                                                            \
+        if (!function) function = (Function)real(#name);                                                     \
         return cl_call(#name, (long *)(status), is_release, function, ARGUMENTS);                            \
     }
 #define STATUS(name)         CL(name, 0, false)
@@ -205,65 +203,30 @@ int posix_memalign(void **result, size_t alignment, size_t size)
     return *result ? 0 : ENOMEM;
 }
 
-#define ALLOCATING(type, name, parameters, arguments)                                                        \
-    type name parameters                                                                                     \
+// Wraps a function whose arguments are integers or pointers. Its name is set as that of the symbol, because
+// its declaration has other types. `failure` is what it returns when it fails.
+#define ALLOCATING(name, failure)                                                                            \
+    long failing_##name(PARAMETERS) __asm__(#name);                                                          \
+    long failing_##name(PARAMETERS)                                                                          \
     {                                                                                                        \
-        return ALLOCATION_FAILS(#name) ? NULL : ((type(*) parameters)real(#name))arguments;                  \
+        return ALLOCATION_FAILS(#name) ? (failure) : ((Function)real(#name))(ARGUMENTS);                     \
     }
 
-ALLOCATING(char *, strdup, (const char *text), (text))
-ALLOCATING(char *, strndup, (const char *text, size_t length), (text, length))
-ALLOCATING(char *, realpath, (const char *path, char *result), (path, result))
-ALLOCATING(FILE *, fopen, (const char *path, const char *mode), (path, mode))
-ALLOCATING(FILE *, fdopen, (int descriptor, const char *mode), (descriptor, mode))
-ALLOCATING(FILE *, tmpfile, (void), ())
-ALLOCATING(FILE *, open_memstream, (char **text, size_t *length), (text, length))
-ALLOCATING(DIR *, fdopendir, (int descriptor), (descriptor))
-
-int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *argument)
-{
-    if (ALLOCATION_FAILS("pthread_create")) return EAGAIN;
-    return ((int (*)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *))real("pthread_create"))(
-        thread, attributes, run, argument);
-}
-
-int inotify_init1(int flags)
-{
-    return ALLOCATION_FAILS("inotify_init1") ? -1 : ((int (*)(int))real("inotify_init1"))(flags);
-}
-
-int eventfd(unsigned value, int flags)
-{
-    return ALLOCATION_FAILS("eventfd") ? -1 : ((int (*)(unsigned, int))real("eventfd"))(value, flags);
-}
-
-int pipe2(int ends[2], int flags)
-{
-    return ALLOCATION_FAILS("pipe2") ? -1 : ((int (*)(int *, int))real("pipe2"))(ends, flags);
-}
-
-int posix_spawn(pid_t *process, const char *path, const posix_spawn_file_actions_t *actions,
-                const posix_spawnattr_t *attributes, char *const arguments[], char *const environment[])
-{
-    if (ALLOCATION_FAILS("posix_spawn")) return ENOMEM;
-    return ((int (*)(pid_t *, const char *, const posix_spawn_file_actions_t *, const posix_spawnattr_t *,
-                     char *const *, char *const *))real("posix_spawn"))(process, path, actions, attributes,
-                                                                        arguments, environment);
-}
-
-pid_t waitpid(pid_t process, int *status, int options)
-{
-    if (!ALLOCATION_FAILS("waitpid"))
-        return ((pid_t(*)(pid_t, int *, int))real("waitpid"))(process, status, options);
-    errno = ECHILD;
-    return -1;
-}
-
-int vasprintf(char **result, const char *format, va_list arguments)
-{
-    if (ALLOCATION_FAILS("vasprintf")) return -1;
-    return ((int (*)(char **, const char *, va_list))real("vasprintf"))(result, format, arguments);
-}
+ALLOCATING(strdup, 0)
+ALLOCATING(strndup, 0)
+ALLOCATING(realpath, 0)
+ALLOCATING(fopen, 0)
+ALLOCATING(fdopen, 0)
+ALLOCATING(tmpfile, 0)
+ALLOCATING(open_memstream, 0)
+ALLOCATING(fdopendir, 0)
+ALLOCATING(pthread_create, EAGAIN)
+ALLOCATING(inotify_init1, -1)
+ALLOCATING(eventfd, -1)
+ALLOCATING(pipe2, -1)
+ALLOCATING(posix_spawn, ENOMEM)
+ALLOCATING(waitpid, -1)
+ALLOCATING(vasprintf, -1)
 
 int asprintf(char **result, const char *format, ...)
 {
