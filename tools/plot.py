@@ -1,40 +1,43 @@
-"""Draws plots with two logarithmic axes as SVG."""
+"""Draws rows of plots as SVG."""
 import math
 
 WIDTH, HEIGHT, LEFT, TOP = 330, 260, 50, 30
 
 
-class LogPanel:
-    """One plot of a row of plots, whose axes span whole powers of ten."""
+def logarithmic(values):
+    """Returns an axis that spans whole powers of ten: its ticks, and the place of a value on it, from 0 to 1."""
+    logarithms = [math.log10(value) for value in values]
+    low, high = math.floor(min(logarithms)), math.ceil(max(logarithms))
+    return [10 ** power for power in range(low, high + 1)], lambda value: (math.log10(value) - low) / max(high - low, 1)
 
-    def __init__(self, number, title, x_values, y_values):
-        self.x0 = LEFT + number * (WIDTH + 50)
-        self.low_x, self.high_x = powers_around(x_values)
-        self.low_y, self.high_y = powers_around(y_values)
+
+def linear(*ticks):
+    return ticks, lambda value: (value - ticks[0]) / (ticks[-1] - ticks[0])
+
+
+class Panel:
+    """One plot of a row. The axis of x is logarithmic."""
+
+    def __init__(self, number, title, x_axis, y_axis):
+        self.x0, self.x_place, self.y_place = LEFT + number * (WIDTH + 50), x_axis[1], y_axis[1]
         self.parts = [f'<text x="{self.x0 + WIDTH / 2}" y="18" text-anchor="middle">{title}</text>']
-        for power in range(self.low_x, self.high_x + 1):
-            x = self.x_of(10 ** power)
-            self.parts.append(f'<path d="M{x:.1f} {TOP}v{HEIGHT}" stroke="#eee"/>'
-                              f'<text x="{x:.1f}" y="{TOP + HEIGHT + 16}" text-anchor="middle">10<tspan dy="-4" font-size="9">{power}</tspan></text>')
-        for power in range(self.low_y, self.high_y + 1):
-            y = self.y_of(10 ** power)
-            self.parts.append(f'<path d="M{self.x0} {y:.1f}h{WIDTH}" stroke="#eee"/>'
-                              f'<text x="{self.x0 - 6}" y="{y + 4:.1f}" text-anchor="end">{10 ** power:g}</text>')
+        for tick in x_axis[0]:
+            power = f'10<tspan dy="-4" font-size="9">{math.log10(tick):.0f}</tspan>'
+            self.parts.append(f'<path d="M{self.x_of(tick):.1f} {TOP}v{HEIGHT}" stroke="#eee"/>'
+                              f'<text x="{self.x_of(tick):.1f}" y="{TOP + HEIGHT + 16}" text-anchor="middle">{power}</text>')
+        for tick in y_axis[0]:
+            self.parts.append(f'<path d="M{self.x0} {self.y_of(tick):.1f}h{WIDTH}" stroke="#eee"/>'
+                              f'<text x="{self.x0 - 6}" y="{self.y_of(tick) + 4:.1f}" text-anchor="end">{tick:g}</text>')
 
     def x_of(self, x):
-        return self.x0 + WIDTH * (math.log10(x) - self.low_x) / max(self.high_x - self.low_x, 1)
+        return self.x0 + WIDTH * self.x_place(x)
 
     def y_of(self, y):
-        return TOP + HEIGHT * (self.high_y - math.log10(y)) / max(self.high_y - self.low_y, 1)
+        return TOP + HEIGHT * (1 - self.y_place(y))
 
     def line(self, points, style):
         places = " ".join(f"{self.x_of(x):.1f},{self.y_of(y):.1f}" for x, y in points)
         self.parts.append(f'<polyline points="{places}" fill="none" {style}/>')
-
-
-def powers_around(values):
-    logarithms = [math.log10(value) for value in values]
-    return math.floor(min(logarithms)), math.ceil(max(logarithms))
 
 
 def svg(panels, legend):
