@@ -1,6 +1,5 @@
 """Provides the small files that tools/chaos renders, damages and enlarges."""
 import struct
-import zlib
 
 SCENE = """\
 camera: {position: [0, 1, -4], look_at: [0, 0, 0], fov: 60}
@@ -42,14 +41,6 @@ end_header
 0 1 1
 3 0 1 2
 """
-
-
-def png(width, height, rows=b""):
-    """Returns a PNG whose header has the given size and whose pixels are `rows`."""
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-            chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def npy(shape):

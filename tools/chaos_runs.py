@@ -9,7 +9,8 @@ import sys
 import time
 from pathlib import Path
 
-from chaos_files import GLTF, MESH_SCENE, OBJ, OFF, OFF_SCENE, PLY, SCENE, pixels, png
+from chaos_files import GLTF, MESH_SCENE, OBJ, OFF, OFF_SCENE, PLY, SCENE, pixels
+from png import RGB, png
 
 OLD = b"an earlier output"
 HANG_SECONDS, WINDOW_SECONDS = 60, 5
@@ -73,8 +74,8 @@ class Runner:
         (folder / "pocl").mkdir()
         files = {"plain.yaml": SCENE, "mesh.yaml": MESH_SCENE, "mesh.obj": OBJ, "mesh.ply": PLY,
                  "off.yaml": OFF_SCENE, "mesh.off": OFF, "mesh.gltf": GLTF,
-                 "rays": "0 0 -4 0 0 1\n0 5 0 0 -1 0\n9 9 9 1 0 0\n", "texture.png": png(2, 2, b"\0\1\2\3\4\5\6" * 2),
-                 "before.png": png(2, 1, b"\0\1\2\3\4\5\6"), "after.png": png(2, 1, b"\0\1\2\3\4\5\7")}
+                 "rays": "0 0 -4 0 0 1\n0 5 0 0 -1 0\n9 9 9 1 0 0\n", "texture.png": png(2, 2, RGB, b"\0\1\2\3\4\5\6" * 2),
+                 "before.png": png(2, 1, RGB, b"\0\1\2\3\4\5\6"), "after.png": png(2, 1, RGB, b"\0\1\2\3\4\5\7")}
         for name, content in files.items():
             (self.work / name).write_bytes(content if isinstance(content, bytes) else content.encode())
         self.inputs = set(files) | {"cache"}
