@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import yaml
 
-SPHERE = re.compile(r"- sphere: {center: \[([^,]+), ([^,]+), ([^\]]+)\], radius: ([^,]+), material: (\w+)}\s*$")
+SPHERE = re.compile(r"^  - sphere: {center: \[([^,]+), ([^,]+), ([^\]]+)\], radius: ([^,]+), material: (\w+)}\n", re.M)
 
 
 class NotModelled(Exception):
@@ -65,19 +65,6 @@ def unit(a):
 
 def triple(values):
     return " ".join(f"{value:.9g}" for value in values)
-
-
-def item_texts(text):
-    """Yields the text of each item of the list of objects. An item starts at a line that begins with two blanks and a dash."""
-    item = []
-    for line in text.splitlines():
-        if line.startswith("  - ") and item:
-            yield "\n".join(item)
-            item = []
-        if line.strip() and not line.lstrip().startswith("#"):
-            item.append(line)
-    if item:
-        yield "\n".join(item)
 
 
 def rotation(degrees):
@@ -154,15 +141,18 @@ def refuse_other_keys(what, mapping, known):
 
 
 def read_scene(path):
-    path = pathlib.Path(path)
-    head, found, objects = path.read_text().partition("\nobjects:\n")
-    if not found:
-        raise ValueError("no list of objects at the end")
-    data = yaml.safe_load(head)
+    path, quick = pathlib.Path(path), []
+
+    def add_sphere(match):
+        *center, radius = map(float, match.groups()[:4])
+        quick.append((center, radius, match[5]))
+        return ""
+
+    data = yaml.safe_load(SPHERE.sub(add_sphere, path.read_text()))  # PyYAML needs minutes for a million spheres
     refuse_other_keys("a camera", data["camera"], ["position", "look_at", "up", "fov"])
     for material in data["materials"].values():
         refuse_other_keys("a material", material, ["color", "ambient", "diffuse", "specular", "shininess", "reflection"])
-    scene = Scene(data["camera"], data.get("background", [0, 0, 0]), data.get("ambient", [0, 0, 0]), [], data["materials"])
+    scene = Scene(data["camera"], data.get("background", [0, 0, 0]), data.get("ambient", [0, 0, 0]), [], data["materials"], quick)
     for light in data["lights"]:
         refuse_other_keys("a light", light, ["point", "directional"])
         ((kind, keys),) = light.items()
@@ -172,14 +162,7 @@ def read_scene(path):
         else:
             scene.suns.append((keys["direction"], color))
     definitions = {name: read_definition(group, path.parent) for name, group in data.get("define", {}).items()}
-    for text in item_texts(objects):
-        quick = SPHERE.match(text.strip())  # PyYAML needs minutes for a million
-        if quick:
-            *numbers, material = quick.groups()
-            *center, radius = map(float, numbers)
-            scene.spheres.append((center, radius, material))
-            continue
-        (item,) = yaml.safe_load(text)
+    for item in data["objects"]:
         ((kind, keys),) = item.items()
         if kind == "sphere":
             scene.spheres.append((keys["center"], keys["radius"], keys["material"]))
