@@ -5,21 +5,10 @@ import struct
 import tempfile
 from math import atan, cos, degrees, radians, sin, sqrt, tan
 
-from hard_cases_programs import Embree, Glint, NotModelled, Povray, Tachyon, povray, tachyon, triple
+from hard_cases_programs import Embree, Glint, Povray, Tachyon, povray, tachyon, triple
+from scene import NotModelled, cross, dot, unit
 
 U = 2.0**-24
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b))
-
-
-def cross(a, b):
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def unit(a):
-    return [x / sqrt(dot(a, a)) for x in a]
 
 
 def along(a, factor, b):

@@ -9,9 +9,7 @@ import subprocess
 import tempfile
 from array import array
 
-
-class NotModelled(Exception):
-    """Raised for a shape that the program does not have."""
+from scene import NotModelled
 
 
 def triple(values, between=" "):
@@ -139,27 +137,23 @@ class Povray:
         """Returns a vector with its coordinates rotated by one place, because POV-Ray's tori lie around y and ours around z."""
         return "<" + triple([values[1], values[2], values[0]], ", ") + ">"
 
+    SHAPES = {
+        "sphere": "sphere {{ {center}, {radius}", "plane": "plane {{ {normal}, 0 translate {point}",
+        "disc": "disc {{ {center}, {normal}, {radius}", "box": "box {{ {min}, {max}",
+        "torus": "torus {{ {major}, {minor} sturm translate {center}", "cylinder": "cylinder {{ {from}, {to}, {radius}",
+    }
+
     def part(self, kind, body):
         v = self.vector
-        if kind == "sphere":
-            return f"sphere {{ {v(body['center'])}, {body['radius']!r}"
-        if kind == "plane":
-            return f"plane {{ {v(body['normal'])}, 0 translate {v(body['point'])}"
-        if kind == "disc":
-            return f"disc {{ {v(body['center'])}, {v(body['normal'])}, {body['radius']!r}"
-        if kind == "box":
-            return f"box {{ {v(body['min'])}, {v(body['max'])}"
         if kind == "triangle":
             return "triangle { " + ", ".join(map(v, body["vertices"]))
-        if kind == "torus":
-            return f"torus {{ {body['major']!r}, {body['minor']!r} sturm translate {v(body['center'])}"
         if kind == "cone":
             (a, b), (start, end) = body["radius"], (v(body["from"]), v(body["to"]))
             return f"cone {{ {start}, {a!r}, {end}, {b!r}"
-        if "from" in body:
-            return f"cylinder {{ {v(body['from'])}, {v(body['to'])}, {body['radius']!r}"
-        assert body["axis"] == [0, 0, 1] and not any(body["point"]), "only cylinders around z are written here"
-        return f"quadric {{ {v([1, 1, 0])}, 0, 0, {-body['radius'] ** 2!r}"
+        if kind == "cylinder" and "from" not in body:
+            assert body["axis"] == [0, 0, 1] and not any(body["point"]), "only cylinders around z are written here"
+            return f"quadric {{ {v([1, 1, 0])}, 0, 0, {-body['radius'] ** 2!r}"
+        return self.SHAPES[kind].format(**{key: v(value) if isinstance(value, list) else repr(value) for key, value in body.items()})
 
     def trace(self, objects, rays):
         """Traces all rays in one run, each as a frame of an animation."""
