@@ -81,8 +81,10 @@ tests         := $(test_programs:%.c=$(BUILD)/%)
 
 all: $(BUILD)/glint
 
+LINK = $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(LIBS)
+
 $(BUILD)/glint: $(objects) | $(if $(has_window),$(BUILD)/glint-view)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+	$(LINK)
 
 # libglint: the rooms below measuring and the command line. Its only symbols are those of glint.h.
 API_VERSION := 1
@@ -109,7 +111,7 @@ $(BUILD)/libglint.a: $(library_objects) host/api/symbols
 
 # What glint view starts.
 $(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs $(window_packages)) -o $@
+	$(LINK) $(shell $(PKG_CONFIG) --libs $(window_packages))
 
 # glint render on the devices of an MPI job; needs libopenmpi-dev.
 mpi_flags := $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags ompi-c 2>/dev/null))
@@ -120,7 +122,7 @@ mpi_objects := $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/mpi/*.c))
 $(mpi_objects): OURS += $(mpi_flags)
 
 $(BUILD)/glint-mpi: $(mpi_objects) $(library)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs ompi-c) -o $@
+	$(LINK) $(shell $(PKG_CONFIG) --libs ompi-c)
 
 # Includes every file of kernels/shapes/.
 $(BUILD)/all_shapes.h: $(shapes) kernels/shapes
@@ -185,11 +187,6 @@ $(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock -Wl,--wrap=u
 # An image is wrong, or is that of another scene.
 $(BUILD)/tests/test_certify_status: private LDFLAGS += -Wl,--wrap=renderer_render_film -Wl,--wrap=renderer_open
 
-ladder: $(BUILD)/tools/numerics/ladder
-
-$(BUILD)/tools/numerics/ladder: $(addprefix $(BUILD)/,tools/numerics/ladder.o tests/random_ray.o) $(library)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
-
 # Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's newest clang.
 CLANG ?= $(or $(lastword $(sort $(wildcard /usr/bin/clang-[1-9][0-9]))),clang)
 fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
@@ -209,14 +206,13 @@ endif
 $(BUILD)/fuzz: $(fuzz_objects)
 	$(CC) $(OURS) $(CFLAGS) -fsanitize=fuzzer $(LDFLAGS) $^ $(LIBS) -o $@
 
-# What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/measure/features SCENE.
-features: $(BUILD)/tools/measure/features
+# make features, kernel_text and ladder build these programs.
+library_clients := measure/features kernels/kernel_text numerics/ladder
+$(foreach program,$(library_clients),$(eval $(notdir $(program)): $(BUILD)/tools/$(program)))
+$(library_clients:%=$(BUILD)/tools/%): %: %.o $(library)
+	$(LINK)
 
-# The kernel's text, for tools/kernels/gpu-resources and tools/kernels/spirv-form.
-kernel_text: $(BUILD)/tools/kernels/kernel_text
-
-$(BUILD)/tools/measure/features $(BUILD)/tools/kernels/kernel_text: %: %.o $(library)
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
+$(BUILD)/tools/numerics/ladder: $(BUILD)/tests/random_ray.o
 
 # These two change only when what they hold does, and what depends on it is then built anew.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(TEXTBOOK)
@@ -236,8 +232,7 @@ embree_headers := $(wildcard tools/peers/embree/*.h)
 
 $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a
 	@mkdir -p $(@D)
-	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(embree_sources) \
-	    $(BUILD)/tests.a -lembree3 $(LIBS) -o $@
+	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(filter-out %.h,$^) -lembree3 $(LIBS) -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
 # installed (docs/performance.md), five minutes of a machine that does nothing else.
@@ -250,18 +245,18 @@ PEERS_JSON    ?= docs/measurements/bench-peers.json
 spd_options := --seconds 1 --size 1024x1024 --precisions single,double --only glint,Tachyon,POV-Ray
 has_embree := $(wildcard /usr/include/embree3/rtcore.h)
 peers_python := $(BUILD)/peers/python/bin/python
-peers_bench = $(peers_python) tools/peers/bench --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree)
+peers_programs := $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree)
+peers_options := --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) --scenes $(PEERS_SCENES) --rounds $(ROUNDS)
 
-bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
-	$(if $(RUNGS),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS))
-	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(spd_options) \
+bench-peers: $(peers_programs) $(peers_python)
+	$(if $(RUNGS),$(peers_python) tools/peers/bench $(peers_options) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS))
+	$(if $(SPD),$(peers_python) tools/peers/bench $(peers_options) $(spd_options) \
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
 	tools/report docs/measurements/README.md
 
 # How times grow with the number of triangles and of spheres, up to ten million: half an hour, 10 GB of memory and of disk.
-bench-growth: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
-	$(peers_python) tools/peers/growth --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
-	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS)
+bench-growth: $(peers_programs) $(peers_python)
+	$(peers_python) tools/peers/growth $(peers_options)
 
 # With PyYAML: Debian's, if it is there.
 $(peers_python):
@@ -394,7 +389,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements library wheel install install-library uninstall clean FORCE
+.PHONY: all mpi fuzz tests test $(notdir $(library_clients)) bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man lint-words docs-measurements library wheel install install-library uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(window_objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,measure/features.d kernels/kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)
+-include $(wildcard $(foreach folder,* */* */*/*,$(BUILD)/$(folder)/*.d))

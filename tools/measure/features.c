@@ -1,10 +1,10 @@
 // Measures what each part of the kernel costs a scene that does not use it. Prints a table in Markdown with
 // the processor times of a frame and of a build, for the kernel with the scene's own features, with one more
 // and with all.
+#include "host/base/clock.h"
 #include "host/base/fault.h"
-#include "host/import/load.h"
+#include "host/cli/open_device.h"
 #include "host/render/renderer.h"
-#include "host/scene/scene.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,22 +24,13 @@ typedef struct {
     double first_seconds, frame_seconds; // the first includes the build
 } Variant;
 
-static double timeval_seconds(struct timeval time)
-{
-    return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
-}
-
 // Returns the processor time of all threads, and of the linkers that a driver started.
 static double processor_seconds(void)
 {
-    double seconds = 0;
-    static const int whose[] = {RUSAGE_SELF, RUSAGE_CHILDREN};
-    for (size_t i = 0; i < sizeof whose / sizeof *whose; i++) {
-        struct rusage usage;
-        getrusage(whose[i], &usage);
-        seconds += timeval_seconds(usage.ru_utime) + timeval_seconds(usage.ru_stime);
-    }
-    return seconds;
+    struct rusage linkers;
+    getrusage(RUSAGE_CHILDREN, &linkers);
+    return clock_processor_seconds() + (double)(linkers.ru_utime.tv_sec + linkers.ru_stime.tv_sec) +
+           1e-6 * (double)(linkers.ru_utime.tv_usec + linkers.ru_stime.tv_usec);
 }
 
 static bool band_drop(void *context, const Film *band)
@@ -64,8 +55,7 @@ static void variant_build(Variant *variant, Compute *compute, const Scene *scene
     MessageList messages = {0};
     renderer_close(variant->renderer);
     variant->renderer = renderer_open(compute, scene, &settings, &messages);
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
+    messages_print(&messages, NULL);
     if (!variant->renderer) exit(EXIT_FAILURE);
     variant->first_seconds = fmin(variant->first_seconds, frame_seconds(variant->renderer));
 }
@@ -102,26 +92,18 @@ int main(int argument_count, char **arguments)
         fputs("usage: features SCENE\n", stderr);
         return EXIT_FAILURE;
     }
-    Scene scene = {0};
-    DeviceList devices;
-    Compute compute;
-    MessageList messages = {0};
-    device_list_open(&devices, NULL);
-    const Device *device = device_choose(&devices, device_selector(NULL), &messages);
-    bool loaded = scene_load(&scene, arguments[1], &(SceneOptions){0}, &messages);
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
-    if (!device || !loaded) return EXIT_FAILURE;
-    compute_open(&compute, device);
-
+    Scene scene;
+    OpenDevice open;
+    if (!scene_open(&scene, arguments[1], &(CommonOptions){0}) || !device_open(&open, &(CommonOptions){0}))
+        return EXIT_FAILURE;
     Variant variants[VARIANT_COUNT] = {0};
     size_t count = variants_list(variants, features_of(&scene));
-    variant_build(&variants[0], &compute, &scene);
+    variant_build(&variants[0], &open.compute, &scene);
     double first = variants[0].first_seconds;
     variants[0].first_seconds = INFINITY;
     for (int round = 0; round < BUILDS; round++)
         for (size_t i = 0; i < count; i++)
-            variant_build(&variants[i], &compute, &scene);
+            variant_build(&variants[i], &open.compute, &scene);
     for (int round = 0; round < ROUNDS; round++)
         for (size_t i = 0; i < count; i++)
             variants[i].frame_seconds = fmin(variants[i].frame_seconds, frame_seconds(variants[i].renderer));
@@ -130,7 +112,5 @@ int main(int argument_count, char **arguments)
     for (size_t i = 0; i < count; i++)
         renderer_close(variants[i].renderer);
     scene_free(&scene);
-    compute_close(&compute);
-    device_list_close(&devices);
-    return EXIT_SUCCESS;
+    return device_close(&open, EXIT_SUCCESS);
 }

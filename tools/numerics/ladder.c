@@ -8,6 +8,7 @@
 #include "host/base/json.h"
 #include "host/base/memory.h"
 #include "host/base/ulp.h"
+#include "host/cli/open_device.h"
 #include "host/render/renderer.h"
 #include "host/verify/random_shape.h"
 #include "host/verify/reference.h"
@@ -15,7 +16,6 @@
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 // Distances from rays' origins to the shape's center, in radii of the shape's bounding sphere.
 static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6};
@@ -43,17 +43,12 @@ typedef struct {
     size_t count;
 } Rays;
 
-// The errors of t that one precision made on one rung, in units of the last place.
+// What one precision made of the rays of one rung.
 typedef struct {
-    double *ulps;
-    size_t count;
-} Errors;
-
-typedef struct {
-    Errors steep, grazing; // at a cosine of 0.1 or more, and at a smaller one
     // `compared` counts all hits and misses, `wrong` those that differ from the reference outside the band in
     // which both are right, and `uncertain` those that differ within it.
     size_t compared, wrong, uncertain;
+    double steep_ulps;     // the largest error of t, in units of the last place, at a cosine of 0.1 or more
     double bound_fraction; // the largest error as a fraction of the tier's bound
 } Tally;
 
@@ -114,8 +109,7 @@ static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision pre
     settings.extra_features = features;
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
+    messages_print(&messages, NULL);
     if (!renderer) exit(EXIT_FAILURE);
     return renderer;
 }
@@ -144,37 +138,11 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     if (!expected->found) return;
     double cosine = (double)expected->cosine, ulp = ulp_of((double)expected->t, bits);
     double off = fabs((double)(hit->t - expected->t));
-    Errors *errors = cosine >= 0.1 ? &tally->steep : &tally->grazing;
-    // NaN and infinity exceed every bound
-    errors->ulps[errors->count++] = isfinite(off) ? off / ulp : HUGE_VAL;
+    if (!isfinite(off)) off = HUGE_VAL; // NaN exceeds every bound
+    if (cosine >= 0.1) tally->steep_ulps = fmax(tally->steep_ulps, off / ulp);
     if (uncertain) return;
     double bound = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
-    tally->bound_fraction = fmax(tally->bound_fraction, isfinite(off) ? off / bound : HUGE_VAL);
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static void errors_write(Json *json, const char *key, Errors *errors)
-{
-    json_begin_object(json, key);
-    json_int64(json, "hits", (int64_t)errors->count);
-    if (errors->count > 0) {
-        qsort(errors->ulps, errors->count, sizeof *errors->ulps, compare_doubles);
-        json_number(json, "p999", errors->ulps[(size_t)(0.999 * (double)(errors->count - 1))]);
-        json_number(json, "max", errors->ulps[errors->count - 1]);
-    }
-    json_end(json);
-}
-
-static double cpu_seconds(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+    tally->bound_fraction = fmax(tally->bound_fraction, off / bound);
 }
 
 static void rays_trace(Renderer *renderer, const Rays *rays)
@@ -187,9 +155,9 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
 {
     double least = HUGE_VAL;
     for (int run = 0; run <= TIMED_RUNS; run++) {
-        double start = cpu_seconds();
+        double start = clock_processor_seconds();
         rays_trace(renderer, rays);
-        double seconds = cpu_seconds() - start;
+        double seconds = clock_processor_seconds() - start;
         if (run > 0) least = fmin(least, seconds); // the first run includes the build
     }
     return least;
@@ -226,25 +194,42 @@ static double test_seconds(Compute *compute, const RandomShape *shape, Precision
 
 typedef struct {
     RandomShape instances[INSTANCES];
-    Renderer *renderers[INSTANCES][ARITHMETIC_COUNT]; // opened when first needed
+    Object objects[INSTANCES][2];                     // with float and with double numbers
+    Renderer *renderers[INSTANCES][ARITHMETIC_COUNT]; // NULL for precisions that are not measured
     const char *name;
 } LadderShape;
 
-// Makes a shape of the first form.
-static LadderShape shape_make(ShapeType type)
+typedef struct {
+    OpenDevice open;
+    LadderOptions options;
+    Json *json;
+    bool within_bounds;
+} Ladder;
+
+static bool is_measured(const Ladder *ladder, Precision precision)
+{
+    return ladder->options.precisions >> precision & 1;
+}
+
+// Makes a shape of the first form, with a renderer for each instance and precision.
+static LadderShape shape_open(Ladder *ladder, ShapeType type)
 {
     LadderShape shape = {.name = shape_names[type]};
     const ShapeForm form = {.type = type};
     Random random = {1};
-    for (int i = 0; i < INSTANCES; i++)
+    for (int i = 0; i < INSTANCES; i++) {
         shape.instances[i] = random_shape(&form, &random);
+        shape.objects[i][0] = reference_round_object(&shape.instances[i].object);
+        shape.objects[i][1] = shape.instances[i].object;
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+            if (!is_measured(ladder, precision)) continue;
+            Material material;
+            Scene scene = scene_of_shapes(&shape.objects[i][precision == PRECISION_DOUBLE], 1, &material);
+            shape.renderers[i][precision] =
+                renderer_of(&ladder->open.compute, &scene, precision, FEATURE_ALL);
+        }
+    }
     return shape;
-}
-
-// Ovals are made of other shapes (tests/test_ovals.c).
-static bool is_measured(ShapeType type, const LadderOptions *options)
-{
-    return type != SHAPE_OVAL && (!options->shape || strcmp(options->shape, shape_names[type]) == 0);
 }
 
 static void shape_close(LadderShape *shape)
@@ -254,89 +239,50 @@ static void shape_close(LadderShape *shape)
             renderer_close(shape->renderers[i][precision]);
 }
 
-static void shape_trace(LadderShape *shape, int which, Precision precision, Compute *compute, Object *object,
-                        Rays *rays)
-{
-    Renderer **renderer = &shape->renderers[which][precision];
-    if (!*renderer) {
-        Material material;
-        Scene scene = scene_of_shapes(object, 1, &material);
-        *renderer = renderer_of(compute, &scene, precision, FEATURE_ALL);
-    }
-    rays_trace(*renderer, rays);
-}
-
-// Adds one shape's errors on one rung. All precisions of one width trace the same rays.
-static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool is_double,
-                         const LadderOptions *options, size_t count, Tally tallies[ARITHMETIC_COUNT])
-{
-    Random random = {3 + (uint64_t)rung};
-    for (int which = 0; which < INSTANCES; which++) {
-        const RandomShape *instance = &shape->instances[which];
-        Object object = is_double ? instance->object : reference_round_object(&instance->object);
-        Rays rays = rays_make(&object, instance, rungs[rung], count, is_double, &random);
-        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-            if (!(options->precisions >> precision & 1) || is_double != (precision == PRECISION_DOUBLE))
-                continue;
-            shape_trace(shape, which, precision, compute, &object, &rays);
-            for (size_t i = 0; i < count; i++)
-                tally_add(&tallies[precision], instance, &rays, i, precision);
-        }
-        rays_free(&rays);
-    }
-}
-
-static void tally_write(Tally *tally, const char *shape, Precision precision, double distance, Json *json)
+static void tally_write(const Tally *tally, const char *shape, Precision precision, double distance,
+                        Json *json)
 {
     json_begin_object(json, NULL);
     json_text(json, "shape", shape);
     json_text(json, "precision", precision_names[precision]);
     json_number(json, "distance", distance);
     json_int64(json, "rays", (int64_t)tally->compared);
-    errors_write(json, "steep", &tally->steep);
-    errors_write(json, "grazing", &tally->grazing);
+    json_begin_object(json, "steep");
+    json_number(json, "max", tally->steep_ulps);
+    json_end(json);
     json_int64(json, "wrong", (int64_t)tally->wrong);
     json_int64(json, "undecided", (int64_t)tally->uncertain);
     json_number(json, "bound_fraction", tally->bound_fraction);
     json_end(json);
 }
 
-static bool tally_within_bounds(const Tally *tally)
+// Measures one shape on one rung. All precisions of one width trace the same rays.
+static void rung_measure(Ladder *ladder, const LadderShape *shape, int rung, bool is_double)
 {
-    return tally->wrong == 0 && tally->bound_fraction <= 1;
-}
-
-// Prints what exceeds the bounds, for --check.
-static void tally_report(const Tally *tally, const char *shape, Precision precision, double distance)
-{
-    if (tally_within_bounds(tally)) return;
-    printf("%s at %g, %s: %zu of %zu wrong, error of t %.3g of the bound\n", shape, distance,
-           precision_names[precision], tally->wrong, tally->compared, tally->bound_fraction);
-}
-
-// Measures one shape on one rung. Returns whether each precision of one width is within the bounds.
-static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_double,
-                     const LadderOptions *options, Json *json)
-{
-    size_t count = options->ray_count / (RUNG_COUNT * INSTANCES) + 1;
+    size_t count = ladder->options.ray_count / (RUNG_COUNT * INSTANCES) + 1;
     Tally tallies[ARITHMETIC_COUNT] = {0};
-    for (int precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-        tallies[precision].steep.ulps = memory_allocate(count * INSTANCES, sizeof(double));
-        tallies[precision].grazing.ulps = memory_allocate(count * INSTANCES, sizeof(double));
-    }
-    rung_measure(compute, shape, rung, is_double, options, count, tallies);
-    bool within_bounds = true;
-    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-        Tally *tally = &tallies[precision];
-        if (tally->compared > 0) {
-            tally_write(tally, shape->name, precision, rungs[rung], json);
-            if (options->check) tally_report(tally, shape->name, precision, rungs[rung]);
-            within_bounds &= tally_within_bounds(tally);
+    Random random = {3 + (uint64_t)rung};
+    for (int i = 0; i < INSTANCES; i++) {
+        Rays rays = rays_make(&shape->objects[i][is_double], &shape->instances[i], rungs[rung], count,
+                              is_double, &random);
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+            if (!is_measured(ladder, precision) || is_double != (precision == PRECISION_DOUBLE)) continue;
+            rays_trace(shape->renderers[i][precision], &rays);
+            for (size_t k = 0; k < count; k++)
+                tally_add(&tallies[precision], &shape->instances[i], &rays, k, precision);
         }
-        free(tally->steep.ulps);
-        free(tally->grazing.ulps);
+        rays_free(&rays);
     }
-    return within_bounds;
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+        const Tally *tally = &tallies[precision];
+        if (tally->compared == 0) continue;
+        tally_write(tally, shape->name, precision, rungs[rung], ladder->json);
+        if (tally->wrong == 0 && tally->bound_fraction <= 1) continue;
+        ladder->within_bounds = false;
+        if (ladder->options.check)
+            printf("%s at %g, %s: %zu of %zu wrong, error of t %.3g of the bound\n", shape->name, rungs[rung],
+                   precision_names[precision], tally->wrong, tally->compared, tally->bound_fraction);
+    }
 }
 
 static bool options_read(LadderOptions *options, int argument_count, char **arguments)
@@ -362,57 +308,59 @@ static bool options_read(LadderOptions *options, int argument_count, char **argu
     return optind == argument_count;
 }
 
+static void shape_measure(Ladder *ladder, ShapeType type)
+{
+    LadderShape shape = shape_open(ladder, type);
+    for (int rung = 0; rung < RUNG_COUNT; rung++)
+        for (int is_double = 0; is_double < 2; is_double++)
+            rung_measure(ladder, &shape, rung, is_double);
+    shape_close(&shape);
+}
+
+static void shape_time(Ladder *ladder, ShapeType type)
+{
+    const ShapeForm form = {.type = type};
+    Random random = {1};
+    RandomShape shape = random_shape(&form, &random);
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+        if (!is_measured(ladder, precision)) continue;
+        json_begin_object(ladder->json, NULL);
+        json_text(ladder->json, "shape", shape_names[type]);
+        json_text(ladder->json, "precision", precision_names[precision]);
+        // milliseconds per million tests are nanoseconds per test
+        json_number(ladder->json, "ms_per_million",
+                    1e9 * test_seconds(&ladder->open.compute, &shape, precision));
+        json_end(ladder->json);
+    }
+}
+
+// Writes an array of measurements of the chosen shapes. Ovals are made of other shapes (tests/test_ovals.c).
+static void shapes_measure(Ladder *ladder, const char *key, void (*measure)(Ladder *, ShapeType))
+{
+    json_begin_array(ladder->json, key);
+    for (ShapeType type = 0; measure && type < SHAPE_MESH; type++)
+        if (type != SHAPE_OVAL &&
+            (!ladder->options.shape || strcmp(ladder->options.shape, shape_names[type]) == 0))
+            measure(ladder, type);
+    json_end(ladder->json);
+}
+
 int main(int argument_count, char **arguments)
 {
-    LadderOptions options;
-    if (!options_read(&options, argument_count, arguments)) {
+    Ladder ladder = {.json = json_open(), .within_bounds = true};
+    if (!options_read(&ladder.options, argument_count, arguments)) {
         fputs("usage: ladder [--rays COUNT] [--shape NAME] [--precision P]... [--time] [--check]\n", stderr);
         return EXIT_FAILURE;
     }
-    DeviceList devices;
-    Compute compute;
-    MessageList messages = {0};
-    device_list_open(&devices, NULL);
-    const Device *device = device_choose(&devices, getenv("GLINT_DEVICE"), &messages);
-    message_list_print(&messages, stderr);
-    message_list_free(&messages);
-    if (!device) return EXIT_FAILURE;
-    compute_open(&compute, device);
-    if (!device->fp64) options.precisions &= ~(1U << PRECISION_DOUBLE);
-
-    bool within_bounds = true;
-    Json *json = json_open();
-    json_text(json, "device", device->name);
-    json_begin_array(json, "rungs");
-    for (int i = 0; options.ray_count > 0 && i < SHAPE_MESH; i++) {
-        if (!is_measured((ShapeType)i, &options)) continue;
-        LadderShape shape = shape_make((ShapeType)i);
-        for (int rung = 0; rung < RUNG_COUNT; rung++)
-            for (int is_double = 0; is_double < 2; is_double++)
-                within_bounds &= rung_run(&compute, &shape, rung, is_double, &options, json);
-        shape_close(&shape);
-    }
-    json_end(json);
-    json_begin_array(json, "tests");
-    for (int i = 0; options.time && i < SHAPE_MESH; i++) {
-        if (!is_measured((ShapeType)i, &options)) continue;
-        LadderShape shape = shape_make((ShapeType)i);
-        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-            if (!(options.precisions >> precision & 1)) continue;
-            json_begin_object(json, NULL);
-            json_text(json, "shape", shape.name);
-            json_text(json, "precision", precision_names[precision]);
-            // milliseconds per million tests are nanoseconds per test
-            json_number(json, "ms_per_million", 1e9 * test_seconds(&compute, &shape.instances[0], precision));
-            json_end(json);
-        }
-    }
-    json_end(json);
-    if (options.check)
-        printf("%s\n", within_bounds ? "all within their bounds" : "beyond their bounds");
+    if (!device_open(&ladder.open, &(CommonOptions){0})) return EXIT_FAILURE;
+    const Device *device = ladder.open.compute.device;
+    if (!device->fp64) ladder.options.precisions &= ~(1U << PRECISION_DOUBLE);
+    json_text(ladder.json, "device", device->name);
+    shapes_measure(&ladder, "rungs", ladder.options.ray_count > 0 ? shape_measure : NULL);
+    shapes_measure(&ladder, "tests", ladder.options.time ? shape_time : NULL);
+    if (ladder.options.check)
+        printf("%s\n", ladder.within_bounds ? "all within their bounds" : "beyond their bounds");
     else
-        json_print(json, stdout);
-    compute_close(&compute);
-    device_list_close(&devices);
-    return within_bounds || !options.check ? EXIT_SUCCESS : 3;
+        json_print(ladder.json, stdout);
+    return device_close(&ladder.open, ladder.within_bounds || !ladder.options.check ? EXIT_SUCCESS : 3);
 }
