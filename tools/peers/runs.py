@@ -49,13 +49,12 @@ def read_ppm(path):
 
 
 def image_difference(path, other_path):
-    """Returns the mean and largest absolute difference in 255ths, the fraction of channels that differ by more than 16 of
-    them, and the fraction of pixels of which some channel differs by more than 2."""
+    """Returns the mean and largest absolute difference in 255ths, and the fraction of pixels of which some channel differs by
+    more than 2."""
     off = bytes(map(abs, map(operator.sub, read_ppm(path), read_ppm(other_path))))
     worst = bytes(map(max, off[0::3], off[1::3], off[2::3]))
     channels, pixels = collections.Counter(off), collections.Counter(worst)
     return {"mean": sum(value * count for value, count in channels.items()) / len(off), "max": max(channels),
-            "far": sum(count for value, count in channels.items() if value > 16) / len(off),
             "pixels_off": sum(count for value, count in pixels.items() if value > 2) / len(worst)}
 
 

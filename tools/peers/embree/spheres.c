@@ -89,25 +89,20 @@ occlude(const struct RTCOccludedFunctionNArguments *arguments, unsigned count)
         RAY_PART(TFAR) = hit[i] ? -far_away : RAY_PART(TFAR);
 }
 
-// A constant count lets the compiler vectorize the loops.
+// Calls a function with the number of rays, as a constant if it is usual, which lets the compiler vectorize.
+#define WITH_COUNT(function, arguments)                                                                      \
+    ((arguments)->N == LANES       ? function(arguments, LANES)                                              \
+     : (arguments)->N == LANES / 2 ? function(arguments, LANES / 2)                                          \
+                                   : function(arguments, (arguments)->N))
+
 static void sphere_intersect(const struct RTCIntersectFunctionNArguments *arguments)
 {
-    if (arguments->N == LANES)
-        intersect(arguments, LANES);
-    else if (arguments->N == LANES / 2)
-        intersect(arguments, LANES / 2);
-    else
-        intersect(arguments, arguments->N);
+    WITH_COUNT(intersect, arguments);
 }
 
 static void sphere_occlude(const struct RTCOccludedFunctionNArguments *arguments)
 {
-    if (arguments->N == LANES)
-        occlude(arguments, LANES);
-    else if (arguments->N == LANES / 2)
-        occlude(arguments, LANES / 2);
-    else
-        occlude(arguments, arguments->N);
+    WITH_COUNT(occlude, arguments);
 }
 
 RTCGeometry spheres_user(RTCDevice device, Sphere *spheres, size_t count)
