@@ -240,7 +240,9 @@ int asprintf(char **result, const char *format, ...)
 
 // ---- system calls
 
-enum { READS = 1, WRITES = 2, CREATES = 4, BY_PATH = 8, FLUSHES = 16 };
+// BY_PATH calls have a folder and a path, OF_PATH calls a path, TO_FOLDER calls a folder as third argument,
+// and the others begin with a descriptor. STORES calls may find the disk full, as WRITES calls do.
+enum { READS = 1, WRITES = 2, CREATES = 4, BY_PATH = 8, STORES = 16, OF_PATH = 32, TO_FOLDER = 64 };
 
 static const struct {
     int number, what;
@@ -251,18 +253,18 @@ static const struct {
     {SYS_readv, 0, "readv"},
     {SYS_write, WRITES, "write"},
     {SYS_pwrite64, WRITES, "pwrite"},
-    {SYS_writev, FLUSHES, "writev"},
-    {SYS_fsync, FLUSHES, "fsync"},
+    {SYS_writev, STORES, "writev"},
+    {SYS_fsync, STORES, "fsync"},
     {SYS_flock, 0, "flock"},
     {SYS_fchmod, 0, "fchmod"},
     {SYS_openat, CREATES | BY_PATH, "open"},
-    {SYS_linkat, 0, "link"},
-    {SYS_renameat, FLUSHES, "rename"},
-    {SYS_renameat2, FLUSHES, "rename"},
+    {SYS_linkat, STORES | TO_FOLDER, "link"},
+    {SYS_renameat, STORES, "rename"},
+    {SYS_renameat2, STORES, "rename"},
     {SYS_newfstatat, BY_PATH, "stat"},
-    {SYS_readlink, 0, "readlink"},
+    {SYS_readlink, OF_PATH, "readlink"},
     {SYS_getdents64, 0, "readdir"},
-    {SYS_mkdir, 0, "mkdir"},
+    {SYS_mkdir, STORES | OF_PATH, "mkdir"},
 };
 enum { TRAPPED_COUNT = sizeof trapped / sizeof *trapped };
 
@@ -287,19 +289,16 @@ static bool path_is_ours(long descriptor, const char *path)
 static long call_make(size_t n, const long *a)
 {
     const int what = trapped[n].what, number = trapped[n].number;
-    bool by_path = (what & BY_PATH) || number == SYS_mkdir || number == SYS_readlink;
-    const char *path = (const char *)(number == SYS_mkdir || number == SYS_readlink ? a[0] : a[1]);
-    long at = number == SYS_mkdir || number == SYS_readlink ? AT_FDCWD : a[0];
-    bool ours = by_path && path && path[0] != '\0' ? path_is_ours(at, path)
-                : number == SYS_linkat             ? descriptor_is_ours(a[2])
-                                                   : descriptor_is_ours(a[0]);
+    const char *path = (const char *)(what & OF_PATH ? a[0] : what & BY_PATH ? a[1] : 0);
+    bool ours = path && path[0] != '\0' ? path_is_ours(what & OF_PATH ? AT_FDCWD : a[0], path)
+                                        : descriptor_is_ours(a[what & TO_FOLDER ? 2 : 0]);
     if (!ours) return pass_through(number, a[0], a[1], a[2], a[3], a[4], a[5]);
     long size = a[2];
     if (is_kind("short") && (what & (READS | WRITES)) && size > 1) size = (size + 1) / 2;
     unsigned long index = atomic_fetch_add(&call_count, 1);
     bool is_it = index == failing;
-    bool grows = (what & (WRITES | FLUSHES)) || number == SYS_mkdir || number == SYS_linkat ||
-                 ((what & CREATES) && (a[2] & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY))));
+    bool grows =
+        (what & (WRITES | STORES)) || ((what & CREATES) && (a[2] & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY))));
     int error = is_kind("call") && is_it                       ? EIO
                 : is_kind("eintr") && is_it                    ? EINTR
                 : is_kind("full") && index >= failing && grows ? ENOSPC
