@@ -1,4 +1,5 @@
-// Renders a description with Embree on all cores. Reports the time of a frame and writes the image.
+// Renders the scene that tools/peers/embree.py wrote with Embree on all cores. Prints the times of building
+// and of frames as JSON, and writes the image.
 #include "packet.h"
 #include "spheres.h"
 
@@ -11,19 +12,11 @@
 #include <time.h>
 #include <xmmintrin.h>
 
+// --incoherent omits Embree's flag for coherent rays, --user-spheres tests spheres in a callback, and
+// --seconds is the time after which no frame begins, but at least 5 are rendered.
 static const char usage[] =
-    "usage: embree DESCRIPTION [OPTIONS]\n"
-    "\n"
-    "Draws the scene that tools/peers/embree.py wrote, and writes the times of its frames as JSON.\n"
-    "\n"
-    "  --single        rays one by one, not in packets of 16\n"
-    "  --user-spheres  with packets: spheres by callbacks of ours, not by Embree's own geometry\n"
-    "  --incoherent    without Embree's flag for coherent rays, which scenes of instances never set\n"
-    "  --quality Q     of the BVH: medium or high (default: high)\n"
-    "  --size WxH      of the image (default: 1920x1080)\n"
-    "  --samples N     of a pixel, in glint's pattern (default: 1)\n"
-    "  --seconds MAX   stop after so long (default: 2), but not before 5 frames\n"
-    "  -o FILE         the image as .ppm, cut at white\n";
+    "usage: embree DESCRIPTION [--single | --user-spheres] [--incoherent] [--quality medium]\n"
+    "              [--size WxH] [--samples N] [--seconds MAX] [-o IMAGE.ppm]\n";
 
 enum { TILE = 32 }; // pixels along the side of a thread's share of work
 
