@@ -81,7 +81,7 @@ tests         := $(test_programs:%.c=$(BUILD)/%)
 
 all: $(BUILD)/glint
 
-LINK = $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(LIBS)
+LINK = $(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 $(BUILD)/glint: $(objects) | $(if $(has_window),$(BUILD)/glint-view)
 	$(LINK)
@@ -110,8 +110,9 @@ $(BUILD)/libglint.a: $(library_objects) host/api/symbols
 	$(AR) rcs $@ $(BUILD)/libglint.o
 
 # What glint view starts.
+$(BUILD)/glint-view: private LIBS += $(shell $(PKG_CONFIG) --libs $(window_packages))
 $(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
-	$(LINK) $(shell $(PKG_CONFIG) --libs $(window_packages))
+	$(LINK)
 
 # glint render on the devices of an MPI job; needs libopenmpi-dev.
 mpi_flags := $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags ompi-c 2>/dev/null))
@@ -121,8 +122,9 @@ mpi: $(BUILD)/glint-mpi
 mpi_objects := $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/mpi/*.c))
 $(mpi_objects): OURS += $(mpi_flags)
 
+$(BUILD)/glint-mpi: private LIBS += $(shell $(PKG_CONFIG) --libs ompi-c)
 $(BUILD)/glint-mpi: $(mpi_objects) $(library)
-	$(LINK) $(shell $(PKG_CONFIG) --libs ompi-c)
+	$(LINK)
 
 # Includes every file of kernels/shapes/.
 $(BUILD)/all_shapes.h: $(shapes) kernels/shapes
