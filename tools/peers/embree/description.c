@@ -32,7 +32,7 @@ static void *array_read(FILE *file, size_t size, size_t *count)
 
 static Mesh mesh_read(FILE *file)
 {
-    Mesh mesh;
+    Mesh mesh = {0};
     mesh.vertices = array_read(file, 3 * sizeof *mesh.vertices, &mesh.vertex_count);
     mesh.normals = array_read(file, 3 * sizeof *mesh.normals, &mesh.normal_count);
     mesh.faces = array_read(file, 3 * sizeof *mesh.faces, &mesh.face_count);
