@@ -7,7 +7,8 @@
 typedef struct {
     uint first_x, first_y, width, height; // in the whole image; in a list, 0, 0, its length and 1
     uint cell;                            // 1, or the side of the squares that have one rendered pixel each
-    global const int *list; // for a list, each pixel's x and y in the whole image and its index in the band
+    global const int *list; // for a list, LIST_WORDS words for each pixel: its x and y in the whole image,
+                            // its index in the band and its slot in the records of the band's ray trees
 } Band;
 
 static inline Band band_of(uint4 pixels, uint cell, global const int *list)
@@ -20,6 +21,7 @@ typedef struct {
     mask inside;   // pixels inside the band
     bool whole;    // all are inside the band, and the band is not a list
     integer index; // the index of each pixel within a list
+    integer slot;  // in a list, the slot of each pixel
     uint first;    // the index of the tile's first pixel within the band
     uint width;    // the band's width
     uint number;   // the tile's number in the order of work-items
@@ -54,15 +56,16 @@ static inline Tile list_tile(const Band *band, uint which)
 {
     uint first = ((uint)get_global_id(0) * TILES + which) * LANES;
     if (get_global_id(1) > 0) first = band->width;
-    IntegerLanes index, x, y, inside;
+    IntegerLanes index, x, y, inside, slot;
     for (uint lane = 0; lane < LANES; lane++) {
         uint at = min(first + lane, band->width - 1);
         inside.each[lane] = first + lane < band->width ? 1 : 0;
         index.each[lane] = at;
-        x.each[lane] = band->list[3 * at];
-        y.each[lane] = band->list[3 * at + 1];
+        x.each[lane] = band->list[LIST_WORDS * at];
+        y.each[lane] = band->list[LIST_WORDS * at + 1];
+        slot.each[lane] = band->list[LIST_WORDS * at + 3];
     }
-    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, 0, band->width, 0};
+    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, slot.all, 0, band->width, 0};
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -94,6 +97,13 @@ static inline integer tile_index(const Tile *tile)
 {
     if (IS_PIXEL_LIST) return tile->index;
     return integer_of(tile->first) + LANE_Y * integer_of(tile->width) + LANE_X;
+}
+
+// Returns the slot of each pixel in the records of the band's ray trees, tile by tile.
+static inline integer tile_slots(const Tile *tile)
+{
+    if (IS_PIXEL_LIST) return tile->slot;
+    return integer_of(tile->number * LANES) + LANE_Y * (integer)(TILE_WIDTH) + LANE_X;
 }
 
 // Defines a function that stores one of `stride` values per pixel.
@@ -202,7 +212,7 @@ static inline void film_merge(global float *band_film, const Band *band, const T
     IntegerLanes inside = {tile->inside}, index = {tile->index};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;
-        global float *pixel = band_film + 3 * (size_t)band->list[3 * index.each[lane] + 2];
+        global float *pixel = band_film + 3 * (size_t)band->list[LIST_WORDS * index.each[lane] + 2];
         pixel[0] = (float)x.each[lane];
         pixel[1] = (float)y.each[lane];
         pixel[2] = (float)z.each[lane];
@@ -219,7 +229,7 @@ static inline void film_flag_pixels(global int *flags, const Tile *tile, mask un
         atomic_or(&flags[first >> 5], (int)(lanes_bits(uncertain & tile->inside) << (first & 31)));
         return;
     }
-    flags += 3 * (size_t)tile->width;
+    flags += LIST_WORDS * (size_t)tile->width;
     IntegerLanes counted = {uncertain}, inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;

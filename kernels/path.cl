@@ -9,9 +9,10 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, SAMPLE_CENTER, tile->inside);
     ShadedHit hits[1];
+    TreeNode nodes[1];
     unsigned_integer signature;
     mask uncertain;
-    ray_tree_color(scene, ray, false, hits, &signature, &uncertain);
+    ray_tree_color(scene, ray, false, nodes, hits, &signature, &uncertain);
     if (IS_CERTIFIED) film_flag_pixels(flags, tile, uncertain, true);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }

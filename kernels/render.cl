@@ -10,11 +10,12 @@
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample,
-                                     global int *flags, global float *band_film)
+                                     global int *flags, global float *band_film, const Records *records)
 {
     Tile tiles[PACKETS];
     Ray rays[PACKETS];
     ShadedHit hits[PACKETS];
+    TreeNode nodes[PACKETS];
     Color3 sums[PACKETS], lost[PACKETS];
     const uint count = scene->header->image.z;
     for (uint i = 0; i < PACKETS; i++) {
@@ -31,13 +32,15 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
             rays[i] = camera_ray(scene->header, tiles[i].pixels, offsets[2 * sample], offsets[2 * sample + 1],
                                  sample, tiles[i].inside);
             ray_counter_add(scene, RAYS_CAMERA, rays[i].active);
+            nodes[i] = tree_root(records, sample, tile_slots(&tiles[i]), tiles[i].inside);
         }
-        if (PACKETS > 1) rays_shade(scene, rays, PACKETS, hits);
+        if (PACKETS > 1) rays_shade(scene, rays, PACKETS, nodes, hits);
         for (uint i = 0; i < PACKETS; i++) {
             if (!lanes_any(tiles[i].inside)) continue;
             unsigned_integer path;
             mask uncertain;
-            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &uncertain);
+            Color3 traced =
+                ray_tree_color(scene, rays[i], PACKETS > 1, &nodes[i], &hits[i], &path, &uncertain);
             if (IS_CERTIFIED) film_flag_pixels(flags, &tiles[i], uncertain, sample == 0);
             if (count == 1) {
                 sums[i] = traced;
@@ -58,13 +61,15 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global scalar *film,
                    uint4 band_pixels, uint first_sample, uint last_sample, global uint *ray_counts, uint cell,
-                   global int *flags, global float *band_film)
+                   global int *flags, global float *band_film, uint4 band_records)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
     Band band = band_of(band_pixels, cell, flags);
     global scalar *compensation = film + (size_t)band.width * band.height * 3;
+    const Records records =
+        records_of(IS_PIXEL_LIST ? (global char *)band_film : (global char *)film, band_records);
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
         tiles_render(&scene, &band, first_tile, sample_offsets, film, compensation, first_sample, last_sample,
-                     flags, band_film);
+                     flags, band_film, &records);
 }

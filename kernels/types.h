@@ -483,6 +483,14 @@ typedef struct {
     ARRAY(INSTANCE_IDS, InstanceIds, , instance_ids)
 // clang-format on
 
+// The words of a pixel in a list of flagged pixels (Band in film.h).
+enum { LIST_WORDS = 4 };
+
+// The words that record a ray's decisions (shading/decisions.h), and how many rays of a tree are recorded:
+// the first eight of a path or, if rays are refracted, those of up to three bounces.
+enum { RECORD_WORDS = 2 };
+#define RECORDED_NODES_OF(has_transmission) ((has_transmission) ? 15 : 8)
+
 // Holds the offset of each array in units of the largest alignment, that of a double16.
 enum { ARENA_UNIT = 128 };
 #define ARENA_OFFSET(NAME, Type, name, names) unsigned names;

@@ -51,6 +51,35 @@ TEST(passes_give_the_bits_of_one_render)
     renderer_close(renderer);
 }
 
+// What the first pass of `certified` proves is replayed in double. If the device's buffers are too small for
+// the record, the second pass searches again.
+TEST(replayed_decisions_change_nothing)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    static const char *const files[] = {"tests/scenes/mirror-balls.yaml", "scenes/mirror-glass.yaml"};
+    Device small = *probe_compute.device;
+    Compute compute = probe_compute;
+    compute.device = &small;
+    small.largest_buffer_bytes = 1 << 17; // holds the film, but not a sample's records
+    for (size_t i = 0; i < COUNT_OF(files); i++) {
+        Scene scene = scene_of_file(files[i]);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
+        settings.sample_count = 3;
+        settings.bvh = BVH_ON;
+        Film searched = film_render(&compute, &scene, &settings, 0);
+        assert_true(searched.rerenders.rerendered > WIDTH * HEIGHT / 10);
+        for (; settings.band_rows <= 8; settings.band_rows += 8) { // several bands use the same buffers
+            Film replayed = film_render(&probe_compute, &scene, &settings, 0);
+            film_assert_same(&replayed, &searched, files[i]);
+            assert_int_equal(replayed.rerenders.rerendered, searched.rerenders.rerendered);
+            assert_int_equal(replayed.rerenders.uncertified, searched.rerenders.uncertified);
+            film_free(&replayed);
+        }
+        film_free(&searched);
+        scene_free(&scene);
+    }
+}
+
 static unsigned stop_countdown;
 
 static bool stop_now(void *context)

@@ -204,7 +204,7 @@ class Aovs(TestCase):
         self.assertEqual(sorted(launches), ["aov", "render"])
         used = set()
         for kernel, launch in launches.items():
-            self.assertEqual([argument["index"] for argument in launch["arguments"]], list(range({"aov": 9, "render": 13}[kernel])))
+            self.assertEqual([argument["index"] for argument in launch["arguments"]], list(range({"aov": 9, "render": 14}[kernel])))
             self.assertIn(f"kernel void {kernel}(".encode(), files[launch["text"]])
             self.assertIn("-cl-std=CL1.2", launch["options"])
             used |= {launch["text"], *(argument["buffer"] for argument in launch["arguments"] if argument.get("buffer"))}

@@ -2,7 +2,10 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/compile/features.h"
 #include <stdlib.h>
+
+static const uint64_t RECORDS_SIZE_MAX = 1 << 27;
 
 enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
 
@@ -39,14 +42,60 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
     return end;
 }
 
-void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film)
+// Returns whether the pass that re-renders flagged pixels may read what this one records of ray trees. It
+// runs after the last sample, and kernels without a BVH or bounces have nothing to record.
+static bool pass_records(Pass *pass)
+{
+    const uint64_t features = pass->scene.compiled.features;
+    return pass->type == PASS_ALL && pass->certifies && pass_next(pass)->compute == pass->compute &&
+           samples_end(&pass->settings) == pass->settings.sample_count && features & FEATURE_BVH &&
+           features & (FEATURE_REFLECTION | FEATURE_TRANSMISSION);
+}
+
+// Returns how many bytes the records of a sample take.
+static size_t records_sample_size(const Pass *pass, const Place *place)
+{
+    const size_t nodes = RECORDED_NODES_OF(pass->scene.compiled.features & FEATURE_TRANSMISSION);
+    return 32 * place_flag_words(place) * nodes * RECORD_WORDS * sizeof(uint32_t);
+}
+
+// Returns how many bytes at most may record ray trees. They are behind the film in its buffer.
+static size_t records_size_max(const Pass *pass, size_t film_size)
+{
+    const Device *device = pass->compute->device;
+    uint64_t most = RECORDS_SIZE_MAX;
+    if (device->memory_bytes > 0 && device->memory_bytes / 32 < most) most = device->memory_bytes / 32;
+    if (device->largest_buffer_bytes == 0) return (size_t)most;
+    const uint64_t left =
+        device->largest_buffer_bytes > film_size ? device->largest_buffer_bytes - film_size : 0;
+    return (size_t)(left < most ? left : most);
+}
+
+void band_record(Pass *pass, BandBuffers *buffers, const Place *place)
+{
+    const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
+                 fitting = buffers->records_size / records_sample_size(pass, place);
+    buffers->records.s[0] = (uint32_t)(32 * place_flag_words(place));
+    buffers->records.s[1] = pass->settings.first_sample;
+    buffers->records.s[2] = (uint32_t)(fitting < samples ? fitting : samples);
+}
+
+void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film, bool records)
 {
     buffers->rows = film.height;
-    buffers->film = buffer_pool_acquire(&pass->pool, pass->compute, band_film_size(&film, aovs, buffers));
-    buffers->ray_counts = buffer_pool_acquire(&pass->pool, pass->compute, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = pass->type != PASS_ALL;
     const Place place = band_place(pass, (BandRows){0, film.height});
-    const size_t words = is_list           ? 4 * film_pixel_count(&film)
+    const size_t film_size = band_film_size(&film, aovs, buffers);
+    if (records && pass_records(pass)) {
+        const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
+                     needed = samples * records_sample_size(pass, &place),
+                     most = records_size_max(pass, film_size);
+        buffers->records_size = needed < most ? needed : most;
+        buffers->records.s[3] = (uint32_t)(film_size / ARENA_UNIT);
+    }
+    buffers->film = buffer_pool_acquire(&pass->pool, pass->compute, film_size + buffers->records_size);
+    buffers->ray_counts = buffer_pool_acquire(&pass->pool, pass->compute, RAYS_COUNT * sizeof(uint32_t));
+    const size_t words = is_list           ? (LIST_WORDS + 1) * film_pixel_count(&film)
                          : pass->certifies ? place_flag_words(&place)
                                            : 0;
     buffers->flags = buffer_pool_acquire(&pass->pool, pass->compute, words * sizeof(uint32_t));
@@ -131,6 +180,7 @@ bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uin
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->flags);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 9, sizeof buffers->records, &buffers->records);
     if (first == pass->settings.first_sample) {
         flags_clear(pass, buffers->flags, place);
         // kernels set the sums and their compensation to 0 at sample 0 only

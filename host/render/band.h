@@ -11,10 +11,15 @@ typedef struct {
     size_t layer_sizes[LAYER_COUNT];  // in bytes, for all rows
     cl_mem ray_counts;
     // At `certified`, a bit for each pixel, tile by tile, set where its color is uncertain. In a list, first
-    // each pixel's x, y and index in the band, then each pixel's number of uncertain samples.
+    // each pixel's x, y, index in the band and slot in the records, then each pixel's number of uncertain
+    // samples.
     cl_mem flags;
-    cl_mem center_flags;      // the same bits for the AOVs' rays
-    cl_mem band_film;         // in a list, where its colors are to go, or NULL
+    cl_mem center_flags; // the same bits for the AOVs' rays
+    cl_mem band_film;    // in a list, where its colors are to go, or NULL
+    // The records of ray trees (kernels/shading/decisions.h), behind the film: slots, first sample, samples,
+    // and where they begin, in ARENA_UNITs. In a list, those of its band.
+    cl_uint4 records;
+    size_t records_size;
     RerenderCounts rerenders; // since the band's last delivery
 } BandBuffers;
 
@@ -23,7 +28,8 @@ typedef struct {
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
 // Provides the buffers for as many pixels as the film has. band_buffers_close keeps them for later bands.
-void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film);
+// With `records`, they have room to record ray trees.
+void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film, bool records);
 void band_buffers_close(BandBuffers *buffers, Pass *pass);
 
 // Maps all rows of a layer of the film as pass_map does, however few the band has, because NVIDIA's driver
@@ -35,6 +41,10 @@ Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count);
 
 // Returns the pace of a kernel's launches, with the target of the settings.
 Pace *pass_pace(Pass *pass, KernelType type);
+
+// Arranges the records for the first of the place's samples, as many as fit. Call it before the first of them
+// is rendered.
+void band_record(Pass *pass, BandBuffers *buffers, const Place *place);
 
 // Renders samples first..last-1 of the place in launches whose size the kernel's pace decides. Returns false
 // if the device failed or settings.stop ended the render.

@@ -103,6 +103,7 @@ static bool band_sample(Pass *pass, BandBuffers *buffers, BandRows rows, uint32_
     bool continues = true;
     pace_begin_band(pace);
     if (first == pass->settings.first_sample) band_clear_flags(pass, buffers, rows);
+    if (buffers->records_size > 0) band_record(pass, buffers, &place);
     while (continues && first < end) {
         const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
         continues = band_render(pass, buffers, &place, first, first + samples) &&
@@ -139,7 +140,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     const uint32_t step = settings->band_rows > 0 ? settings->band_rows : group_shape(pass).height;
     const uint32_t end = samples_end(settings);
     BandBuffers buffers = {0};
-    band_buffers_open(&buffers, pass, aovs, film_of_rows(pass, 0, rows_max(pass, aovs)));
+    band_buffers_open(&buffers, pass, aovs, film_of_rows(pass, 0, rows_max(pass, aovs)), true);
     kernels_get(&pass->kernels, KERNEL_RENDER); // builds it before rows wait for it
     Pace *pace = pass_pace(pass, KERNEL_RENDER);
     pace_begin_band(pace); // the last render's band may belong to another scene or size
@@ -176,7 +177,7 @@ static bool first_pass(Pass *pass, PassBands *bands, unsigned aovs, const BandQu
     for (uint32_t row = 0; continues && row < height;) {
         uint32_t left = height - row;
         PassBand band = {.rows = {row, band_rows(pass, pace, 1, left < most ? left : most)}};
-        band_buffers_open(&band.buffers, pass, aovs, film_of_rows(pass, 0, band.rows.row_count));
+        band_buffers_open(&band.buffers, pass, aovs, film_of_rows(pass, 0, band.rows.row_count), false);
         array_push(*bands, band);
         continues = band_sample(pass, &band.buffers, band.rows, 0, 1, queue) &&
                     band_deliver(pass, &band.buffers, AOV_COLOR, band.rows, 1, queue);

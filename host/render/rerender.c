@@ -9,7 +9,9 @@
 typedef struct {
     uint32_t x, y;  // in the image
     uint32_t index; // in the band
+    uint32_t slot;  // in the records of the band's ray trees
 } ListPixel;
+_Static_assert(sizeof(ListPixel) == LIST_WORDS * sizeof(uint32_t), "kernels read it as words");
 
 typedef ARRAY_OF(ListPixel) PixelList;
 
@@ -31,8 +33,9 @@ static PixelList flagged_list(const Pass *pass, BandRows rows, const uint32_t *f
             const uint32_t y =
                 (item / items_of_row * MACRO_TILE_ROWS_OF(lanes) + which / columns) * tile_height +
                 lane / tile_width;
-            array_push(list, ((ListPixel){settings->region_x + x * cell,
-                                          settings->region_y + (rows.first_row + y) * cell, y * width + x}));
+            array_push(
+                list, ((ListPixel){settings->region_x + x * cell,
+                                   settings->region_y + (rows.first_row + y) * cell, y * width + x, number}));
         }
     return list;
 }
@@ -146,9 +149,12 @@ static bool list_rerender(Pass *pass, const RerenderedBand *band, PixelList *lis
                        .real_size = pass_scalar_size(pass)};
     const Place place = list_place(pass, (uint32_t)list->count);
     BandBuffers buffers = {0};
-    band_buffers_open(&buffers, pass, band->aovs, film);
+    band_buffers_open(&buffers, pass, band->aovs, film, false);
     const bool is_last = samples_end(&pass->settings) == pass->settings.sample_count;
-    buffers.band_film = is_last && pass->compute == band->pass->compute ? band->buffers->film : NULL;
+    if (is_last && pass->compute == band->pass->compute) {
+        buffers.band_film = band->buffers->film;
+        buffers.records = band->buffers->records;
+    }
     list_write(pass, buffers.flags, list);
     bool is_whole = band->type == KERNEL_RENDER ? list_render(pass, &buffers, &place)
                                                 : band_fill(pass, band->type, &buffers, band->aovs, &place);

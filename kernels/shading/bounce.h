@@ -25,6 +25,9 @@ typedef struct {
     integer origin_object;
     mask leaves_outward;
     real chord_turn, chord_end_place;
+    // with HAS_DECISIONS, the ray's number in its tree and the lanes in which its node is recorded
+    uint number;
+    mask known;
 } Bounce;
 
 static inline mask bounce_is_active(const Bounce *bounce)

@@ -5,6 +5,9 @@
 #include "shading/normal_map.h"
 #include "traversal/traversal.h"
 
+// Marks finished lanes. It is larger than any id.
+#define NO_OBJECT ((integer)(INT_MAX))
+
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, uint index, const Ray *ray,
                                                real t)
 {

@@ -4,6 +4,7 @@
 #define PATH_H
 
 #include "shading/certain_bounce.h"
+#include "shading/decisions.h"
 #include "shading/light_visibility.h"
 #include "shading/medium.h"
 
@@ -72,22 +73,37 @@ static inline void packets_trace(Traversal *traversals, const Scene *scene, Ray 
 }
 
 // Traces `count` packets of rays and shades their hits, without lights if COMPUTE_SIGNATURE.
-static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, ShadedHit *hits)
+static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, TreeNode *nodes,
+                                   ShadedHit *hits)
 {
     Traversal traversals[PACKETS];
     Ray shadow_rays[PACKETS];
     LightVisibility lights[PACKETS];
     const uint light_count = COMPUTE_SIGNATURE ? 0 : scene->header->image.w;
     uint found = 0; // the packets that hit anything, as bits
+    Replay replays[PACKETS];
+    mask seen[PACKETS]; // the lanes that are known to see the light
+    for (uint i = 0; i < count && REPLAYS_DECISIONS; i++)
+        replay_begin(&replays[i], scene, &nodes[i], &rays[i]);
     packets_trace(traversals, scene, rays, count, (1u << count) - 1, CLOSEST_HIT);
-    for (uint i = 0; i < count; i++)
+    for (uint i = 0; i < count; i++) {
+        if (REPLAYS_DECISIONS) replay_end(&replays[i], &rays[i], &traversals[i].hit);
         if (hit_shade(scene, &rays[i], &traversals[i], &hits[i])) found |= 1u << i;
+        if (RECORDS_DECISIONS) node_set_hit(&nodes[i], &rays[i], hits[i].surface.object, hits[i].uncertain);
+    }
     for (uint light = 0; found != 0 && light < light_count; light++) {
-        for (uint i = 0; i < count; i++)
-            if (found >> i & 1) lights[i] = light_reach(scene, &hits[i].surface, light, &shadow_rays[i]);
+        for (uint i = 0; i < count; i++) {
+            if (!(found >> i & 1)) continue;
+            lights[i] = light_reach(scene, &hits[i].surface, light, &shadow_rays[i]);
+            if (REPLAYS_DECISIONS) seen[i] = replay_light(&nodes[i], light, &shadow_rays[i]);
+        }
         packets_trace(traversals, scene, shadow_rays, count, found, OCCLUSION);
-        for (uint i = 0; i < count; i++)
-            if (found >> i & 1) hit_add_light(scene, light, &lights[i], &traversals[i], &hits[i]);
+        for (uint i = 0; i < count; i++) {
+            if (!(found >> i & 1)) continue;
+            if (REPLAYS_DECISIONS) traversals[i].active = traversals[i].active | seen[i];
+            if (RECORDS_DECISIONS) node_set_light(&nodes[i], light, &shadow_rays[i], &traversals[i]);
+            hit_add_light(scene, light, &lights[i], &traversals[i], &hits[i]);
+        }
     }
 }
 
@@ -135,13 +151,13 @@ static inline void hit_bounce(const Scene *scene, const Ray *ray, const Surface 
     }
 }
 
-// Traces a ray tree depth first, reflected before refracted, and returns its color. *shaded, an element of
-// an array, holds the hit of the current ray. With `is_shaded` it holds the camera ray's at first, which
-// rays_shade has traced with other packets. If COMPUTE_SIGNATURE, sets *path to the tree's signature
-// (types.h), which in each lane is independent of the other lanes, and the color is undefined. At
-// `certified` sets *uncertain to the lanes with any uncertain decision.
-static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
-                                    unsigned_integer *path, mask *uncertain)
+// Traces a ray tree depth first, reflected before refracted, and returns its color. *node and *shaded,
+// elements of arrays, hold the current ray's node and hit; *node is the root's at first. With `is_shaded` it
+// holds the camera ray's at first, which rays_shade has traced with other packets. If COMPUTE_SIGNATURE, sets
+// *path to the tree's signature (types.h), which in each lane is independent of the other lanes, and the
+// color is undefined. At `certified` sets *uncertain to the lanes with any uncertain decision.
+static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, TreeNode *node,
+                                    ShadedHit *shaded, unsigned_integer *path, mask *uncertain)
 {
     const Color3 black = color_gray((real)(0));
     *uncertain = mask_none();
@@ -154,7 +170,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0;
     for (;;) {
-        if (traced.depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
+        if (traced.depth > 0 || !is_shaded) rays_shade(scene, rays, 1, node, shaded);
         const mask active = rays[0].active, found = surface_found(&shaded->surface);
         if (IS_CERTIFIED) *uncertain = *uncertain | (active & shaded->uncertain);
         if (traced.depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, found);
@@ -179,6 +195,8 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (lanes_any(found) && traced.depth < scene->header->bounces.x)
             hit_bounce(scene, rays, &shaded->surface, &traced, &bounces, uncertain);
         if (COMPUTE_SIGNATURE) *path = path_signature_add(*path, rays, shaded->surface.object, &bounces);
+        if (HAS_DECISIONS) node_set_children(node, &bounces);
+        if (RECORDS_DECISIONS) node_store(node, &bounces);
         const mask reflects = bounce_is_active(&bounces.reflected),
                    refracts = bounce_is_active(&bounces.refracted);
         ray_counter_add(scene, RAYS_REFLECTED, reflects);
@@ -193,6 +211,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
             traced = pending[--pending_count];
         }
         rays[0] = bounce_ray(&traced);
+        if (HAS_DECISIONS) node_set_bounce(node, &traced);
     }
     if (IS_CERTIFIED & !COMPUTE_SIGNATURE)
         *uncertain = *uncertain | (ray.active & color_is_uncertain(color, color_error));

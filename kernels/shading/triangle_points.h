@@ -6,9 +6,6 @@
 #include "shapes/instance.h"
 #include "shapes/triangle_normals.h"
 
-// Marks finished lanes. It is larger than any id.
-#define NO_OBJECT ((integer)(INT_MAX))
-
 // Triangles of one material, one per lane.
 typedef struct {
     mask lanes, next_to_eye; // next_to_eye: those with has_eye_height

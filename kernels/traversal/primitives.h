@@ -238,6 +238,15 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 }
 #endif
 
+// Intersects an object, given as its type_index_material.
+static inline void intersect_object(Traversal *traversal, const Scene *scene, const Ray *ray, uint4 entry)
+{
+#define INTERSECT_OBJECT(feature, Type, name, names)                                                         \
+    if (HAS_##feature && entry.x == TYPE_##feature)                                                          \
+        intersect_##name(traversal, scene, ray, scene->names[entry.y]);
+    SHAPE_LIST(INTERSECT_OBJECT)
+}
+
 // Returns whether the leaves of a type are blocks.
 static inline bool type_has_blocks(uint type)
 {
