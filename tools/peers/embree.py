@@ -1,8 +1,17 @@
-"""Writes a scene for tools/peers/embree, a renderer on Embree (Debian package libembree-dev)."""
+"""Runs tools/peers/embree, a renderer on Embree (Debian package libembree-dev), and writes its scenes."""
 import itertools
+import os
 from array import array
 
+from runs import run_once
 from scene import NotModelled, cross, unit
+
+
+def run(program, description, *options):
+    """Runs the renderer on all cores. Its threads sleep between frames, because spinning would count as processor time."""
+    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
+    environment.pop("OMP_NUM_THREADS", None)
+    return run_once([program, description, *options], environment)
 
 
 def write_scene(scene, path, _size=None):
