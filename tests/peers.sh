@@ -14,21 +14,25 @@ bench() { # EMBREE RUNG…
     "$python" tools/peers/bench --glint "$GLINT" --scenes "$scratch/scenes" --rounds 1 --seconds 0.02 --size 240x136 \
         --precisions single --json "$scratch/bench.json" --only glint,Embree --embree "$@"
 }
+# Coarse smooth meshes have larger limits, because only glint starts shadow rays on the curve of the triangles. The mean
+# differences of these two are 0.18 and 0.048 of 255.
 agree_within() { # MEAN ROW…
     "$python" - "$scratch/bench.json" "$@" <<'PYTHON'
 import json, sys
 rungs, mean = json.load(open(sys.argv[1]))["rungs"], float(sys.argv[2])
+means = {"bunny-2000": 0.2, "sun-2000x4": 0.06}
 for row in sys.argv[3:]:
-    found = [rung["programs"][row] for rung in rungs if row in rung["programs"]]
+    found = {rung["scene"]: rung["programs"][row] for rung in rungs if row in rung["programs"]}
     assert found, f"{row} was not run"
-    for program in found:
+    for scene, program in found.items():
         difference = program["difference"]
         assert program["peak_bytes"] > 1e6, (row, program)
-        assert program["frame_ms"]["median"] > 0 and difference["agrees"] and difference["mean"] < mean, (row, program)
+        assert program["frame_ms"]["median"] > 0 and difference["agrees"], (row, program)
+        assert difference["mean"] < means.get(scene, mean), (scene, row, program)
 PYTHON
 }
 
-# Moves the eye: a description begins with the number of cameras, in 8 bytes, and x of the eye as a float, which becomes 0.3.
+# Moves the eye. A description begins with the number of cameras, in 8 bytes, and the eye's x as a float, which becomes 0.3.
 cat >"$scratch/moved" <<SH
 #!/bin/sh
 { head -c 8 "\$1"; printf '\232\231\231\76'; tail -c +13 "\$1"; } >"$scratch/moved.embree"
@@ -43,7 +47,7 @@ other_work_is_reported() {
 
 rungs=(spheres-16 bunny-2000 sun-2000x4 soup-500 forest-50)
 check "spheres, meshes, instances, a directional light and samples are timed" bench "$build/peers/embree" "${rungs[@]}"
-check "all of Embree's images are glint's" agree_within 0.2 "Embree packets" "Embree packets, our spheres" "Embree single rays"
+check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
 stretched_instances_are_refused() {
     sed 's/{scale: [0-9.]*}/{scale: [1, 2, 1]}/' "$scratch/scenes/forest-50.yaml" >"$scratch/scenes/stretched.yaml"
     message=$("$python" -B -c 'import sys; sys.path.insert(0, "tools/peers"); import scene; scene.read_scene(sys.argv[1])' \
