@@ -93,6 +93,8 @@ void verify_camera_frames(VerifyRun *run)
         {.position = {1e7, 1e7, 1e7}, .look_at = {1e7, 1e7 + 1, 1e7}, .up = {0, 1, 0}, .half_tangent = 1},
         {.look_at = {1e-30, 0, 0}, .up = {0, 1e30, 0}, .half_tangent = 1},
         {.look_at = {0, 0, 1e30}, .up = {0, 1e-30, 0}, .half_tangent = 1},
+        {.look_at = {0, 0, 3}, .up = {0, 1e300, 0}, .half_tangent = 1},
+        {.look_at = {0, 0, 3}, .up = {0, 1e-300, 0}, .half_tangent = 1},
     };
     for (size_t i = 0; i < COUNT_OF(refused); i++)
         run->result->wrong += !is_camera_refused(refused[i]);
