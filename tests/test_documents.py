@@ -97,7 +97,7 @@ def ladder_wrong():
 
 
 def ladder_open(distances):
-    return max(100 * rung["undecided"] / rung["rays"] for rung in rungs(*OWN, distances=distances))
+    return max(100 * rung["uncertain"] / rung["rays"] for rung in rungs(*OWN, distances=distances))
 
 
 def textbook_wrong(shapes, *distances):

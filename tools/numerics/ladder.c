@@ -43,7 +43,7 @@ typedef struct {
     size_t count;
 } Rays;
 
-// What one precision made of the rays of one rung.
+// Summarizes the answers of one precision to the rays of one rung.
 typedef struct {
     // `compared` counts all hits and misses, `wrong` those that differ from the reference outside the band in
     // which both are right, and `uncertain` those that differ within it.
@@ -251,7 +251,7 @@ static void tally_write(const Tally *tally, const char *shape, Precision precisi
     json_number(json, "max", tally->steep_ulps);
     json_end(json);
     json_int64(json, "wrong", (int64_t)tally->wrong);
-    json_int64(json, "undecided", (int64_t)tally->uncertain);
+    json_int64(json, "uncertain", (int64_t)tally->uncertain);
     json_number(json, "bound_fraction", tally->bound_fraction);
     json_end(json);
 }
