@@ -108,13 +108,25 @@ const Material *material_of(const Object *object)
     return &complete.materials.items[object->material];
 }
 
-// How many numbers and then flags a shape has in Object.as.
+// How many numbers and then flags a shape has in Object.as. The assertions notice further numbers, and flags
+// that do not fit in the padding.
+#define SHAPE_MEMBERS(SHAPE)                                                                                 \
+    SHAPE(SPHERE, sphere, 4, 1)                                                                              \
+    SHAPE(PLANE, plane, 6, 0)                                                                                \
+    SHAPE(DISC, disc, 7, 0)                                                                                  \
+    SHAPE(BOX, box, 6, 0)                                                                                    \
+    SHAPE(CYLINDER, cylinder, 7, 3)                                                                          \
+    SHAPE(CONE, cone, 9, 3)                                                                                  \
+    SHAPE(TRIANGLE, triangle, 18, 1)
+#define SHAPE_ASSERT(NAME, name, numbers, flags)                                                             \
+    _Static_assert(sizeof((Object *)0)->as.name - (numbers) * sizeof(double) - (flags) < sizeof(double),     \
+                   #name " has other members");
+#define SHAPE_ROW(NAME, name, numbers, flags) [SHAPE_##NAME] = {numbers, flags},
+SHAPE_MEMBERS(SHAPE_ASSERT)
+
 static const struct {
     size_t numbers, flags;
-} shape_members[] = {
-    [SHAPE_SPHERE] = {4, 1},   [SHAPE_PLANE] = {6, 0}, [SHAPE_DISC] = {7, 0},      [SHAPE_BOX] = {6, 0},
-    [SHAPE_CYLINDER] = {7, 3}, [SHAPE_CONE] = {9, 3},  [SHAPE_TRIANGLE] = {18, 1},
-};
+} shape_members[] = {SHAPE_MEMBERS(SHAPE_ROW)};
 
 void check_shapes(const Object *objects, const Object *expected, size_t count)
 {
@@ -124,7 +136,7 @@ void check_shapes(const Object *objects, const Object *expected, size_t count)
         assert_true(type < COUNT_OF(shape_members));
         const double *numbers = (const double *)&objects[i].as, *others = (const double *)&expected[i].as;
         for (size_t k = 0; k < shape_members[type].numbers; k++)
-            if (fabs(numbers[k] - others[k]) > 1e-14 * fmax(1, fabs(others[k])))
+            if (!(fabs(numbers[k] - others[k]) <= 1e-14 * fmax(1, fabs(others[k]))))
                 fail_msg("object %zu, number %zu: %.17g, not %.17g", i, k, numbers[k], others[k]);
         const size_t end = shape_members[type].numbers;
         assert_memory_equal(numbers + end, others + end, shape_members[type].flags);

@@ -461,7 +461,7 @@ TEST(measures_distances)
                 normal_found |= sheet->distance <= 2 * fabs(height) && turned < 1e-7;
             }
             // to first order, of a paraboloid
-            if (fabs(distance - fabs(height)) > 1e-7 * fabs(height) || !normal_found)
+            if (!(fabs(distance - fabs(height)) <= 1e-7 * fabs(height)) || !normal_found)
                 fail_msg("%s: %g off the surface, not %g", forms[type].name, distance, height);
             measured++;
         }

@@ -132,7 +132,7 @@ TEST(transformed_objects_are_hit_where_plain_ones_are)
         for (size_t i = 0; i < RAYS; i++) {
             const bool hit = hits[0][i].object != UINT32_MAX, other = hits[1][i].object != UINT32_MAX;
             hit_count += hit;
-            if (hit != other || (hit && fabs(hits[0][i].t - hits[1][i].t) > 1e-9 * hits[1][i].t))
+            if (hit != other || (hit && !(fabs(hits[0][i].t - hits[1][i].t) <= 1e-9 * hits[1][i].t)))
                 fail_msg("%s: ray %zu: t %.17g, expected %.17g", pairs[p].name, i, hits[0][i].t,
                          hits[1][i].t);
         }

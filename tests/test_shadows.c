@@ -129,7 +129,7 @@ static void compare_with_reference(const Scene *scene, RenderSettings settings, 
         const Film *films[] = {&film, &perturbed};
         for (unsigned k = 0; k < 2 && films[k]->color && !at_edge; k++) {
             double seen = films[k]->color[3 * (size_t)i];
-            if (fabs(seen - expected.color.x) > error)
+            if (!(fabs(seen - expected.color.x) <= error))
                 fail_msg("%s, %s%s: pixel %u,%u is %g, not %g", what, precision_names[settings.precision],
                          k == 1 ? " with injected errors" : "", x, y, seen, expected.color.x);
         }
