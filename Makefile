@@ -232,9 +232,9 @@ test:
 embree_sources := $(wildcard tools/peers/embree/*.c)
 embree_headers := $(wildcard tools/peers/embree/*.h)
 
-$(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a
+$(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a Makefile
 	@mkdir -p $(@D)
-	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(filter-out %.h,$^) -lembree3 $(LIBS) -o $@
+	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(filter %.c %.a,$^) -lembree3 $(LIBS) -o $@
 
 # make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
 # installed (docs/performance.md), five minutes of a machine that does nothing else.

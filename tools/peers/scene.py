@@ -162,7 +162,7 @@ def read_scene(path):
         else:
             scene.suns.append((keys["direction"], color))
     definitions = {name: read_definition(group, path.parent) for name, group in data.get("define", {}).items()}
-    for item in data["objects"]:
+    for item in data["objects"] or []:  # null if all are spheres of one line
         ((kind, keys),) = item.items()
         if kind == "sphere":
             scene.spheres.append((keys["center"], keys["radius"], keys["material"]))

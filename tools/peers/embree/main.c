@@ -15,7 +15,7 @@
 // --incoherent omits Embree's flag for coherent rays, --user-spheres tests spheres in a callback, and
 // --seconds is the time after which no frame begins, but at least 5 are rendered.
 static const char usage[] =
-    "usage: embree DESCRIPTION [--single | --user-spheres] [--incoherent] [--quality medium]\n"
+    "usage: embree DESCRIPTION [--single | --user-spheres] [--incoherent] [--quality medium|high]\n"
     "              [--size WxH] [--samples N] [--seconds MAX] [-o IMAGE.ppm]\n";
 
 enum { TILE = 32 }; // pixels along the side of a thread's share of work
@@ -168,6 +168,15 @@ static void ppm_write(const Renderer *renderer, const char *path)
     }
 }
 
+// Reads a number from 1 to 65536 that `last` follows. Returns the text after that, or NULL on an error.
+static const char *number_read(const char *text, char last, unsigned *number)
+{
+    char *end;
+    unsigned long found = text && *text != '-' ? strtoul(text, &end, 10) : 0;
+    *number = (unsigned)found;
+    return found >= 1 && found <= 65536 && *end == last ? end + 1 : NULL;
+}
+
 static Options options_read(int count, char **words)
 {
     static const struct option names[] = {
@@ -183,16 +192,24 @@ static Options options_read(int count, char **words)
         if (letter == 's') options.one_by_one = true;
         if (letter == 'u') options.user_spheres = true;
         if (letter == 'i') options.incoherent = true;
-        if (letter == 'q' && strcmp(optarg, "medium") == 0) options.quality = RTC_BUILD_QUALITY_MEDIUM;
-        if (letter == 'w') options.width = (unsigned)strtoul(optarg, &end, 10);
-        if (letter == 'w' && *end == 'x') options.height = (unsigned)strtoul(end + 1, NULL, 10);
-        if (letter == 'm') options.seconds = strtod(optarg, NULL);
-        if (letter == 'n') options.samples = (unsigned)strtoul(optarg, NULL, 10);
+        if (letter == 'q') {
+            options.quality =
+                strcmp(optarg, "medium") == 0 ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
+            is_sound &= options.quality == RTC_BUILD_QUALITY_MEDIUM || strcmp(optarg, "high") == 0;
+        }
+        if (letter == 'w') {
+            const char *height = number_read(optarg, 'x', &options.width);
+            is_sound &= number_read(height, '\0', &options.height) != NULL;
+        }
+        if (letter == 'm') {
+            options.seconds = strtod(optarg, &end);
+            is_sound &= end != optarg && *end == '\0' && options.seconds >= 0;
+        }
+        if (letter == 'n') is_sound &= number_read(optarg, '\0', &options.samples) != NULL;
         if (letter == 'o') options.output = optarg;
         is_sound &= letter != '?';
     }
-    is_sound &= options.width >= 1 && options.height >= 1 && options.samples >= 1 &&
-                !(options.one_by_one && options.user_spheres);
+    is_sound &= !(options.one_by_one && options.user_spheres);
     if (!is_sound || optind != count - 1) {
         fputs(usage, stderr);
         exit(1);
