@@ -203,30 +203,30 @@ int posix_memalign(void **result, size_t alignment, size_t size)
     return *result ? 0 : ENOMEM;
 }
 
-// Wraps a function whose arguments are integers or pointers. Its name is set as that of the symbol, because
-// its declaration has other types. `failure` is what it returns when it fails.
-#define ALLOCATING(name, failure)                                                                            \
+// Wraps a function whose arguments are integers or pointers. Its symbol is named explicitly, because libc
+// declares it with other types. `failure` is what it returns when it fails.
+#define FAILING(name, failure)                                                                               \
     long failing_##name(PARAMETERS) __asm__(#name);                                                          \
     long failing_##name(PARAMETERS)                                                                          \
     {                                                                                                        \
         return ALLOCATION_FAILS(#name) ? (failure) : ((Function)real(#name))(ARGUMENTS);                     \
     }
 
-ALLOCATING(strdup, 0)
-ALLOCATING(strndup, 0)
-ALLOCATING(realpath, 0)
-ALLOCATING(fopen, 0)
-ALLOCATING(fdopen, 0)
-ALLOCATING(tmpfile, 0)
-ALLOCATING(open_memstream, 0)
-ALLOCATING(fdopendir, 0)
-ALLOCATING(pthread_create, EAGAIN)
-ALLOCATING(inotify_init1, -1)
-ALLOCATING(eventfd, -1)
-ALLOCATING(pipe2, -1)
-ALLOCATING(posix_spawn, ENOMEM)
-ALLOCATING(waitpid, -1)
-ALLOCATING(vasprintf, -1)
+FAILING(strdup, 0)
+FAILING(strndup, 0)
+FAILING(realpath, 0)
+FAILING(fopen, 0)
+FAILING(fdopen, 0)
+FAILING(tmpfile, 0)
+FAILING(open_memstream, 0)
+FAILING(fdopendir, 0)
+FAILING(pthread_create, EAGAIN)
+FAILING(inotify_init1, -1)
+FAILING(eventfd, -1)
+FAILING(pipe2, -1)
+FAILING(posix_spawn, ENOMEM)
+FAILING(waitpid, -1)
+FAILING(vasprintf, -1)
 
 int asprintf(char **result, const char *format, ...)
 {
@@ -240,9 +240,9 @@ int asprintf(char **result, const char *format, ...)
 
 // ---- system calls
 
-// BY_PATH calls have a folder and a path, OF_PATH calls a path, TO_FOLDER calls a folder as third argument,
-// and the others begin with a descriptor. STORES calls may find the disk full, as WRITES calls do.
-enum { READS = 1, WRITES = 2, CREATES = 4, BY_PATH = 8, STORES = 16, OF_PATH = 32, TO_FOLDER = 64 };
+// FOLDER_PATH calls have a folder and a path, PATH_ALONE calls a path, TO_FOLDER calls a folder as third
+// argument, and the others begin with a descriptor. STORES calls may find the disk full, as WRITES calls do.
+enum { READS = 1, WRITES = 2, CREATES = 4, FOLDER_PATH = 8, STORES = 16, PATH_ALONE = 32, TO_FOLDER = 64 };
 
 static const struct {
     int number, what;
@@ -257,14 +257,14 @@ static const struct {
     {SYS_fsync, STORES, "fsync"},
     {SYS_flock, 0, "flock"},
     {SYS_fchmod, 0, "fchmod"},
-    {SYS_openat, CREATES | BY_PATH, "open"},
+    {SYS_openat, CREATES | FOLDER_PATH, "open"},
     {SYS_linkat, STORES | TO_FOLDER, "link"},
     {SYS_renameat, STORES, "rename"},
     {SYS_renameat2, STORES, "rename"},
-    {SYS_newfstatat, BY_PATH, "stat"},
-    {SYS_readlink, OF_PATH, "readlink"},
+    {SYS_newfstatat, FOLDER_PATH, "stat"},
+    {SYS_readlink, PATH_ALONE, "readlink"},
     {SYS_getdents64, 0, "readdir"},
-    {SYS_mkdir, STORES | OF_PATH, "mkdir"},
+    {SYS_mkdir, STORES | PATH_ALONE, "mkdir"},
 };
 enum { TRAPPED_COUNT = sizeof trapped / sizeof *trapped };
 
@@ -289,8 +289,8 @@ static bool path_is_ours(long descriptor, const char *path)
 static long call_make(size_t n, const long *a)
 {
     const int what = trapped[n].what, number = trapped[n].number;
-    const char *path = (const char *)(what & OF_PATH ? a[0] : what & BY_PATH ? a[1] : 0);
-    bool ours = path && path[0] != '\0' ? path_is_ours(what & OF_PATH ? AT_FDCWD : a[0], path)
+    const char *path = (const char *)(what & PATH_ALONE ? a[0] : what & FOLDER_PATH ? a[1] : 0);
+    bool ours = path && path[0] != '\0' ? path_is_ours(what & PATH_ALONE ? AT_FDCWD : a[0], path)
                                         : descriptor_is_ours(a[what & TO_FOLDER ? 2 : 0]);
     if (!ours) return pass_through(number, a[0], a[1], a[2], a[3], a[4], a[5]);
     long size = a[2];
