@@ -1,5 +1,5 @@
 // Reads images as other programs write them, with other colors or orientations, and files that are damaged,
-// too large or no images.
+// too large or not images.
 #include "host/image/image.h"
 #include "tests/check.h"
 #include "tests/files.h"

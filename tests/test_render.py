@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Tests what glint render writes: images in each format, their notes and layers, and what options change of them."""
+"""Tests what glint render writes: images in each format, their notes and layers, and how options change them."""
 import json
 import math
 import os

@@ -181,7 +181,7 @@ TEST(a_scale_that_is_nearly_the_same_counts_as_the_same)
     assert_false(affine_keeps_balls(&clearly, &scale));
 }
 
-TEST(a_torus_keeps_its_tube)
+TEST(a_tube_that_vanishes_is_refused)
 {
     const Affine shrink = affine_of_steps(vector_all(1e-29), vector_all(0), vector_all(0));
     Object torus = {.type = SHAPE_TORUS, .as.torus = {.axis = {0, 1, 0}, .major = 1, .minor = 1e-300}};
