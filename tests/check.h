@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include "host/base/message.h"
 #include "host/base/text.h"
+#include "tests/owned.h"
 
 #include <float.h>
 #include <math.h>
@@ -18,22 +19,6 @@
 #include <unistd.h>
 
 #include <cmocka.h>
-
-static inline void pointer_free(void *pointer)
-{
-    free(*(void **)pointer);
-}
-
-// A variable of these types frees its contents where its scope ends. A test that fails leaks them.
-#define OWNED              __attribute__((cleanup(pointer_free))) // a pointer
-#define OwnedBenchTimes    __attribute__((cleanup(bench_times_free))) BenchTimes
-#define OwnedCertifySample __attribute__((cleanup(certify_sample_close))) CertifySample
-#define OwnedCompiledScene __attribute__((cleanup(compiled_scene_free))) CompiledScene
-#define OwnedFilm          __attribute__((cleanup(film_free))) Film
-#define OwnedImage         __attribute__((cleanup(image_free))) Image
-#define OwnedMessageList   __attribute__((cleanup(message_list_free))) MessageList
-#define OwnedScene         __attribute__((cleanup(scene_free))) Scene
-#define OwnedText          __attribute__((cleanup(text_free))) Text
 
 // Returns formatted text, valid until the fourth call after this one.
 const char *formatted(const char *format, ...) __attribute__((format(printf, 1, 2)));
