@@ -225,6 +225,33 @@ TEST(template)
     free(printed);
 }
 
+static void wrong_template_write(void *number)
+{
+    switch (*(int *)number) {
+    case 0:
+        json_addf(json_open(), "a %i b %s", 1, "text");
+        break;
+    case 1:
+        json_addf(json_open(), "a %x", 1U);
+        break;
+    default:
+        json_addf(json_open(), "a_key_of_64_characters_that_is_one_more_than_a_template_may_have %d", true);
+    }
+}
+
+TEST(wrong_templates)
+{
+    static const char *const messages[] = {"glint: JSON: the template has an unknown conversion: %i b %s\n",
+                                           "glint: JSON: the template has an unknown conversion: %x\n",
+                                           "glint: JSON: a key of the template is too long: a_key_of_64"};
+    for (int i = 0; i < (int)COUNT_OF(messages); i++) {
+        int number = i;
+        const ChildEnd end = child_run(wrong_template_write, &number, sizeof number);
+        assert_int_equal(end.status, EXIT_MACHINE);
+        assert_non_null(strstr(end.errors, messages[i]));
+    }
+}
+
 TEST(deep_nesting)
 {
     enum { DEPTH = 1000 };

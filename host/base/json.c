@@ -138,63 +138,73 @@ void json_none(Json *json, const char *key)
     json_word(json, key, "null");
 }
 
-// Adds the next of the values, which has the printf conversion that starts at the template's `%`.
-static void json_value(Json *json, const char *key, const char *conversion, size_t length, va_list *values)
+// Skips a conversion if the template continues with it.
+static bool template_skip(const char **members, const char *conversion)
 {
-    const char size = conversion[length - 2];
+    const size_t length = strlen(conversion);
+    if (strncmp(*members, conversion, length) != 0) return false;
+    *members += length;
+    return true;
+}
+
+// Adds the next of the values, whose conversion starts at the template's `%`, and skips the conversion.
+static void json_value(Json *json, const char *key, const char **members, va_list *values)
+{
     char hash[17];
-    switch (conversion[length - 1]) {
-    case 's':
+    if (template_skip(members, "%s")) {
         json_text(json, key, va_arg(*values, const char *));
-        break;
-    case 'g':
+    } else if (template_skip(members, "%g")) {
         json_number(json, key, va_arg(*values, double));
-        break;
-    case 'd':
+    } else if (template_skip(members, "%d")) {
         json_bool(json, key, va_arg(*values, int));
-        break;
-    case 'x':
+    } else if (template_skip(members, "%u")) {
+        json_count(json, key, va_arg(*values, unsigned));
+    } else if (template_skip(members, "%zu")) {
+        const size_t count = va_arg(*values, size_t);
+        json_count(json, key, count);
+    } else if (template_skip(members, "%" PRIu64)) {
+        json_count(json, key, va_arg(*values, uint64_t));
+    } else if (template_skip(members, "%016" PRIx64)) {
         snprintf(hash, sizeof hash, "%016" PRIx64, va_arg(*values, uint64_t));
         json_text(json, key, hash);
-        break;
-    default:
-        json_count(json, key,
-                   size == 'l'   ? va_arg(*values, uint64_t)
-                   : size == 'z' ? va_arg(*values, size_t)
-                                 : va_arg(*values, unsigned));
+    } else {
+        fault("JSON: the template has an unknown conversion: %s", *members);
     }
 }
 
 void json_addf(Json *json, const char *members, ...)
 {
     char text[64];
+    size_t length;
     const char *key = NULL;
     va_list values;
     va_start(values, members);
-    for (size_t length; *members != '\0'; members += length) {
-        length = 1;
+    while (*members != '\0') {
         switch (*members) {
         case ' ':
+            members++;
             break;
         case '{':
         case '[':
             json_next(json, key);
-            json_begin(json, *members == '{');
+            json_begin(json, *members++ == '{');
             key = NULL;
             break;
         case '}':
         case ']':
             json_end(json);
+            members++;
             break;
         case '%':
-            length = strcspn(members, "sgdux") + 1;
-            json_value(json, key, members, length, &values);
+            json_value(json, key, &members, &values);
             key = NULL;
             break;
         default:
             length = strcspn(members, " ");
+            if (length >= sizeof text) fault("JSON: a key of the template is too long: %s", members);
             snprintf(text, sizeof text, "%.*s", (int)length, members);
             key = text;
+            members += length;
         }
     }
     va_end(values);
