@@ -2,7 +2,6 @@
 
 #include "host/base/memory.h"
 #include "host/image/heatmap.h"
-#include "host/image/image_metrics.h"
 #include "host/image/transfer.h"
 #include <math.h>
 #include <stdlib.h>
@@ -61,14 +60,25 @@ void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half
     }
 }
 
+// Returns the largest difference of a channel. It is infinite if a value is not finite, unless the other one
+// equals it.
+static double pixel_error(const Film *film, const Film *reference, size_t pixel)
+{
+    double error = 0;
+    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
+        const double difference = fabs(film->color[i] - reference->color[i]);
+        if (film->color[i] != reference->color[i])
+            error = fmax(error, isnan(difference) ? INFINITY : difference);
+    }
+    return error;
+}
+
 double view_error(uint8_t *pixels, const Film *film, const Film *reference)
 {
     double largest = 0;
     for (size_t i = 0; i < film_pixel_count(film); i++) {
         float color[3];
-        double error = 0;
-        for (size_t k = 3 * i; k < 3 * i + 3; k++)
-            error = fmax(error, value_error(reference->color[k], film->color[k]));
+        double error = pixel_error(film, reference, i);
         largest = fmax(largest, error);
         heatmap_error_color(error, VIEW_ERROR_WHITE, color);
         for (size_t channel = 0; channel < 3; channel++)

@@ -31,5 +31,6 @@ void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half
 #define VIEW_ERROR_WHITE 1e-3
 
 // Sets a heat map of each pixel's largest difference of a channel, on a logarithmic scale, which is black up
-// to HEATMAP_DECADES powers of ten below white. Returns the largest difference of the image.
+// to HEATMAP_DECADES powers of ten below white. A pixel with a value that is not finite is red, unless the
+// reference has that same infinity. Returns the largest difference of the image.
 double view_error(uint8_t *pixels, const Film *film, const Film *reference);
