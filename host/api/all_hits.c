@@ -120,7 +120,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
 {
     MessageList list = {0};
     GlintRays given;
-    GlintAllHits found = {0};
+    GlintAllHits found = {.size = sizeof found};
     if (!struct_has_size(hits, ALL_HITS_SIZE_MIN, "GlintAllHits", &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     struct_write(hits, &found, sizeof found);
@@ -142,7 +142,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
 
 void glint_all_hits_free(GlintAllHits *hits)
 {
-    if (!hits) return;
+    if (!hits || hits->size < ALL_HITS_SIZE_MIN) return; // without a size it has no arrays
     free(hits->ray);
     free(hits->object);
     free(hits->t);
