@@ -133,6 +133,7 @@ void verify_matched_glass(VerifyRun *run)
     Scene *without = matched_scene(run, "");
     Film empty = verify_render(run, without, false, 256, 256);
     for (unsigned k = 0; k < COUNT_OF(matched); k++) {
+        const CaseMemory before = run->memory;
         Scene *scene = matched_scene(run, matched[k]);
         Film image = verify_render(run, scene, false, 256, 256);
         size_t through = 0;
@@ -144,5 +145,6 @@ void verify_matched_glass(VerifyRun *run)
         }
         run->result->wrong += through == 0;
         check_straight_rays(run, matched[k], 71 + k);
+        verify_release_since(run, &before);
     }
 }

@@ -102,11 +102,13 @@ void verify_scaled_scenes(VerifyRun *run)
     Film image = verify_render(run, scene, false, 160, 120);
     demand_every_object(run, scene, &image);
     for (size_t i = 0; i < COUNT_OF(exponents); i++) {
+        const CaseMemory before = run->memory;
         double scale = ldexp(1, exponents[i]);
         Scene *scaled = every_shape_scene(run);
         scene_scale(scaled, scale);
         Film other = verify_render(run, scaled, i % 2, 160, 120);
         compare(run, &image, &(View){&other, scale, false});
+        verify_release_since(run, &before);
     }
 }
 

@@ -51,6 +51,7 @@ void verify_far_fringe(VerifyRun *run)
                                      "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
     static const double distances[] = {10, 100, 1e3, 1e4};
     for (size_t k = 0; k < COUNT_OF(distances); k++) {
+        const CaseMemory before = run->memory;
         double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
         scene->camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
@@ -59,6 +60,7 @@ void verify_far_fringe(VerifyRun *run)
         check_radial_brightness(run, &image);
         VerifyTarget sphere = verify_target(run, &scene->objects.items[0], eye);
         if (run->tier != TIER_A) check_fringe(run, &image, &sphere);
+        verify_release_since(run, &before);
     }
 }
 
@@ -196,9 +198,11 @@ void verify_thin_ring(VerifyRun *run)
     const Vector3 eye = {0, -5, 5};
     Scene *scene = torus_scene(run, 0.001);
     for (size_t k = run->settings->quick ? 1 : 0; k < COUNT_OF(views); k++) {
+        const CaseMemory before = run->memory;
         scene->camera = verify_camera(eye, origin, views[k].fov);
         Film image = verify_render(run, scene, false, views[k].side, views[k].side);
         check_pixels(run, &image, scene);
         if (k == 1) run->result->leaks += count_parts(run, &image) != 1;
+        verify_release_since(run, &before);
     }
 }

@@ -19,15 +19,21 @@ void *verify_allocate(VerifyRun *run, size_t count, size_t size)
     return block;
 }
 
+void verify_release_since(VerifyRun *run, const CaseMemory *before)
+{
+    CaseMemory *memory = &run->memory;
+    while (memory->films.count > before->films.count)
+        film_free(&memory->films.items[--memory->films.count]);
+    while (memory->scenes.count > before->scenes.count)
+        scene_free(memory->scenes.items[--memory->scenes.count]);
+    while (memory->blocks.count > before->blocks.count)
+        free(memory->blocks.items[--memory->blocks.count]);
+}
+
 void verify_release(VerifyRun *run)
 {
     CaseMemory *memory = &run->memory;
-    for (size_t i = 0; i < memory->films.count; i++)
-        film_free(&memory->films.items[i]);
-    for (size_t i = 0; i < memory->scenes.count; i++)
-        scene_free(memory->scenes.items[i]);
-    for (size_t i = 0; i < memory->blocks.count; i++)
-        free(memory->blocks.items[i]);
+    verify_release_since(run, &(CaseMemory){0});
     free(memory->films.items);
     free(memory->scenes.items);
     free(memory->blocks.items);

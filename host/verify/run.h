@@ -27,11 +27,11 @@ typedef struct {
 // The checks of a case that are not in the tables. Each counts its faults in the run's result.
 typedef void VerifyCheck(VerifyRun *run);
 
-// of rays, and of cameras
+// The checks of rays, and of the cameras of R8. The table in verify.c names the case of each check.
 VerifyCheck verify_scaled_directions, verify_leaving_spheres, verify_points_on_faces, verify_coincident_faces,
     verify_far_mesh, verify_scale_ladder, verify_within_triangle, verify_facing_triangle,
     verify_degenerate_meshes, verify_bvh, verify_instances, verify_critical_angle, verify_camera_frames;
-// of images
+// The checks of images.
 VerifyCheck verify_far_fringe, verify_wire, verify_apex, verify_far_torus, verify_tangent_circle,
     verify_thin_ring, verify_ground_horizon, verify_plane_horizon, verify_sizes, verify_plane_acne,
     verify_thin_plate, verify_contact_shadow, verify_nested_spheres, verify_matched_glass, verify_highlights,
@@ -46,6 +46,8 @@ static inline bool verify_is_double(const VerifyRun *run)
 void *verify_allocate(VerifyRun *run, size_t count, size_t size);
 // Ends a case, and frees what it has allocated.
 void verify_release(VerifyRun *run);
+// Frees what the case has allocated since its memory was `before`, such as a large image that was checked.
+void verify_release_since(VerifyRun *run, const CaseMemory *before);
 
 // Returns how many of `count` random rays or pixels to use, which is a sixteenth in a quick run.
 size_t verify_part(const VerifyRun *run, size_t count);

@@ -18,6 +18,7 @@ void verify_plane_acne(VerifyRun *run)
         Vector3 eye =
             vector_add(point, vector_add(vector_scale(unit, 3 * size), vector_scale(across, 0.5 * size)));
         for (size_t light = 0; light < COUNT_OF(elevations); light++) {
+            const CaseMemory before = run->memory;
             double angle = elevations[light] * (M_PI / 180);
             Scene *scene = verify_scene(run, "lights:\n  - directional: {direction: [0, 0, 1]}\n"
                                              "objects:\n  - plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n");
@@ -42,6 +43,7 @@ void verify_plane_acne(VerifyRun *run)
             verify_record(
                 run, (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u, 8,
                 "u");
+            verify_release_since(run, &before);
         }
     }
 }
