@@ -278,7 +278,7 @@ class View(TestCase):
         window = Window(self, LD_PRELOAD=self.failing_calls())
         window.saved()
         write("fails", "")
-        for key in "Left", "Up":
+        for key in "Left", "Up", "r", "r":
             window.key(key)
             window.line("^clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
         os.remove("fails")

@@ -35,8 +35,8 @@ static bool is_other_image(const FrameRequest *a, const FrameRequest *b)
 bool request_is_due(const Window *window)
 {
     const FrameRequest *wanted = &window->wanted, *sent = &window->sent;
-    return window->request == 0 || wanted->scene_frame != sent->scene_frame || is_other_image(wanted, sent) ||
-           !cameras_equal(&wanted->camera, &sent->camera);
+    return window->request == 0 || window->resends || wanted->scene_frame != sent->scene_frame ||
+           is_other_image(wanted, sent) || !cameras_equal(&wanted->camera, &sent->camera);
 }
 
 void request_send(Window *window)
@@ -48,6 +48,7 @@ void request_send(Window *window)
     window->request = frame_loop_request(window->frames, wanted);
     if (is_other_image(wanted, &window->sent)) window->image_request = window->request;
     window->sent = *wanted;
+    window->resends = false;
 }
 
 // Asks for the facts of the pixel under the cursor, if they are shown.

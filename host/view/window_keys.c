@@ -134,6 +134,7 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
         break;
     case SDLK_r:
         wanted->camera = window->scene.camera;
+        window->resends = true; // tries again after a failure
         break;
     case SDLK_c:
         camera_print(window);
@@ -155,7 +156,7 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_3:
     case SDLK_4:
         wanted->precision = (Precision)(event->keysym.sym - SDLK_1);
-        window->sent.precision = PRECISION_COUNT; // the reason is repeated if the device lacks the precision
+        window->resends = true; // repeats the reason if the device lacks the precision
         break;
     case SDLK_t:
         window->shows_times = !window->shows_times;

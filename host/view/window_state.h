@@ -47,10 +47,11 @@ typedef struct {
     FrameLoop *frames;
     Screen screen;
 
-    FrameRequest wanted;    // what is to be shown, by a camera that follows the scene's own until it is moved
-    FrameRequest sent;      // the last request, which is due again once it differs from `wanted`
+    FrameRequest wanted;    // the image to show, whose camera is the scene's until the user moves it
+    FrameRequest sent;      // the last request; the next one is due once `wanted` differs from it
     unsigned request;       // its number, 0 before the first
     unsigned image_request; // the number of the last one for another view, precision or size
+    bool resends;           // the next one is due even if `wanted` equals `sent`
 
     // what the loop has delivered
     SceneUpdate scene;
@@ -68,7 +69,7 @@ typedef struct {
 const char *scene_name(const Window *window);
 // Takes the message; NULL shows none.
 void message_show(Window *window, char *message);
-// Returns whether the last request is not for what is to be shown.
+// Returns whether `wanted` must be requested.
 bool request_is_due(const Window *window);
 // Sends a request if it is due.
 void request_send(Window *window);
