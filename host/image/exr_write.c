@@ -16,7 +16,8 @@ typedef struct {
     char *channels; // names, each ended by a null
     size_t channel_count;
     bool is_integer;
-    uint8_t *rows; // in the queue
+    uint8_t *queue;      // of rows, until there are enough for all blocks
+    const uint8_t *rows; // to compress: the queue, or the caller's if these suffice
 } WrittenLayer;
 
 // A channel of the file and the indices of its layer and of its value in each pixel.
@@ -43,8 +44,9 @@ typedef struct {
     size_t layer_count;
     ExrChannel *channels; // of all layers, by name, as in the file
     size_t channel_count;
-    uint32_t block_rows, queue_size, queued_rows, written_rows; // the size in rows
-    int write_error;                                            // errno of a failed write
+    uint32_t block_rows, queue_size; // in rows
+    uint32_t queued_rows, written_rows;
+    int write_error; // errno of a failed write
 } ExrWriter;
 
 // Silences the library, which calls this with its lock held, so that the context must not be used here.
@@ -186,11 +188,12 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     state->queue_size = BLOCKS_MAX * state->block_rows;
     if (state->queue_size > header->height) state->queue_size = header->height;
     for (size_t i = 0; i < state->layer_count; i++)
-        state->layers[i].rows = memory_allocate(state->queue_size, layer_row_size(writer, &state->layers[i]));
+        state->layers[i].queue =
+            memory_allocate(state->queue_size, layer_row_size(writer, &state->layers[i]));
     return true;
 }
 
-// Points a channel of the file at its values from a row of the queue on.
+// Points a channel of the file at its values from a row on, counted from the first that was not written.
 static void channel_place(const ImageWriter *writer, exr_encode_pipeline_t *pipeline, uint32_t first_row,
                           int index)
 {
@@ -237,7 +240,7 @@ static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pi
     return code;
 }
 
-// Sets up the pipeline of a block, whose rows begin at `first_row` of the queue.
+// Sets up the pipeline of a block, whose rows begin at `first_row` of those that were not written.
 static exr_result_t block_prepare(const ImageWriter *writer, ExrBlock *block, uint32_t first_row)
 {
     ExrWriter *state = writer->state;
@@ -255,7 +258,7 @@ static exr_result_t block_prepare(const ImageWriter *writer, ExrBlock *block, ui
     return is_first ? pipeline_prepare(state, pipeline) : code;
 }
 
-// Compresses the queue and writes it.
+// Compresses the queued rows and writes them.
 static exr_result_t queue_write(ImageWriter *writer)
 {
     ExrWriter *state = writer->state;
@@ -283,9 +286,12 @@ static bool exr_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
         const uint32_t room = state->queue_size - state->queued_rows;
         count = row_count - row < room ? row_count - row : room;
         for (size_t i = 0; i < state->layer_count; i++) {
-            const size_t size = layer_row_size(writer, &state->layers[i]);
-            memcpy(state->layers[i].rows + state->queued_rows * size, (const uint8_t *)arrays[i] + row * size,
-                   count * size);
+            WrittenLayer *layer = &state->layers[i];
+            const size_t size = layer_row_size(writer, layer);
+            const uint8_t *from = (const uint8_t *)arrays[i] + row * size;
+            const bool is_full = count == state->queue_size;
+            if (!is_full) memcpy(layer->queue + state->queued_rows * size, from, count * size);
+            layer->rows = is_full ? from : layer->queue;
         }
         state->queued_rows += count;
         if (state->queued_rows == state->queue_size) code = queue_write(writer);
@@ -316,7 +322,7 @@ static void exr_free(ImageWriter *writer)
     exr_close(state);
     for (size_t i = 0; i < state->layer_count; i++) {
         free(state->layers[i].channels);
-        free(state->layers[i].rows);
+        free(state->layers[i].queue);
     }
     free(state->channels);
     free(state);
