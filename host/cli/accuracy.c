@@ -263,6 +263,7 @@ static bool has_reference(Accuracy *accuracy)
     const bool is_certified = options->variants.common.precisions >> PRECISION_CERTIFIED & 1;
     if (options->reference_path && !is_certified) return true;
     if (!reference_open(compute, &accuracy->open.devices, selector)) return false;
+    if (!compute_ok(compute)) return true; // device_close reports it
     // with a file, only the rows at certified are unavailable
     if (options->reference_path || compute_in_double(compute)->device->fp64) return true;
     return message_error(
@@ -307,7 +308,8 @@ static int accuracy_run(Accuracy *accuracy)
     const AccuracyReport *report = &accuracy->report;
     const ReportOptions *options = &accuracy->options.variants.common.report;
     if (report_has_text(options)) accuracy_print_text(report, stdout);
-    if (!report_write(accuracy_json(report), options) || !page_commit(accuracy)) return EXIT_USER;
+    if (report_has_document(options) && !report_write(accuracy_json(report), options)) return EXIT_USER;
+    if (!page_commit(accuracy)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);
     return EXIT_USER;

@@ -221,7 +221,8 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
     };
     const ReportOptions *format = &options->variants.common.report;
     if (report_has_text(format)) bench_print_text(&report, stdout);
-    int status = report_write(bench_json(&report), format) ? EXIT_DONE : EXIT_USER;
+    int status = EXIT_DONE;
+    if (report_has_document(format) && !report_write(bench_json(&report), format)) status = EXIT_USER;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;

@@ -337,7 +337,9 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
     if (status == EXIT_DONE) {
         passports_recall(device); // the workers have cached them
         if (report_has_text(&options->report)) against_print_text(&against, device);
-        if (!report_write(against_json(&against, device), &options->report)) status = EXIT_USER;
+        if (report_has_document(&options->report) &&
+            !report_write(against_json(&against, device), &options->report))
+            status = EXIT_USER;
         if (status == EXIT_DONE) status = comparisons_status(against.comparisons, set->count, options->other);
     }
     if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);

@@ -246,8 +246,10 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
         if (!options->common.precisions || options->common.precisions >> i & 1)
             status = precision_compare(&certification, settings, (Precision)i);
     }
-    if (status == EXIT_DONE && report_has_text(&options->common.report)) text_print(&certification);
-    if (status == EXIT_DONE && !report_write(certify_json(&certification), &options->common.report))
+    const ReportOptions *report = &options->common.report;
+    if (status == EXIT_DONE && report_has_text(report)) text_print(&certification);
+    if (status == EXIT_DONE && report_has_document(report) &&
+        !report_write(certify_json(&certification), report))
         status = EXIT_USER;
     if (status == EXIT_DONE) status = decided_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)

@@ -295,9 +295,10 @@ int command_diff(int argument_count, char **arguments)
     MessageList messages = {0};
     bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);
-    if (compared && report_has_text(&options.common.report)) text_print(&options, &comparison);
+    const ReportOptions *report = &options.common.report;
+    if (compared && report_has_text(report)) text_print(&options, &comparison);
     const bool is_written =
-        compared && report_write(diff_json(&options, &comparison), &options.common.report);
+        compared && (!report_has_document(report) || report_write(diff_json(&options, &comparison), report));
     image_free(&comparison.reference);
     image_free(&comparison.test);
     if (!is_written) return EXIT_USER;

@@ -380,10 +380,6 @@ static void document_write(Writing *writing, ReportFormat format, Text *text)
 bool report_write(Json *json, const ReportOptions *options)
 {
     Text document = json_close(json), text = {0};
-    if (options->format == FORMAT_TEXT) {
-        text_free(&document);
-        return true;
-    }
     if (options->format == FORMAT_JSON) {
         text = document;
     } else {

@@ -64,6 +64,11 @@ static inline bool report_has_text(const ReportOptions *options)
 {
     return options->format == FORMAT_TEXT || options->output;
 }
-// Writes the report in the options' format, unless that is FORMAT_TEXT, and frees it. Returns false with a
+// Returns whether the command writes a report in another format.
+static inline bool report_has_document(const ReportOptions *options)
+{
+    return options->format != FORMAT_TEXT;
+}
+// Writes the report in the options' format, which is not FORMAT_TEXT, and frees it. Returns false with a
 // message if the file cannot be written.
 bool report_write(Json *json, const ReportOptions *options);

@@ -305,8 +305,9 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         differing += checks[i].is_new || checks[i].first < HASHED_COUNT;
         if (status == EXIT_DONE && report_has_text(&options->common.report)) check_print(&checks[i]);
     }
-    if (status == EXIT_DONE &&
-        !report_write(checks_json(compute->device, checks, checked), &options->common.report))
+    const ReportOptions *report = &options->common.report;
+    if (status == EXIT_DONE && report_has_document(report) &&
+        !report_write(checks_json(compute->device, checks, checked), report))
         status = EXIT_USER;
     for (size_t i = 0; i < checked; i++)
         free(checks[i].crop);

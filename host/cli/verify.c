@@ -2,6 +2,7 @@
 #include "host/verify/verify.h"
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/exit_status.h"
 #include "host/base/json.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
@@ -343,7 +344,8 @@ static int device_verify(Verification *verification, Compute *compute)
     }
     progress_close(&verification->progress);
     if (verification->has_text) passports_remark(compute->device, stdout);
-    if (!report_write(journal_json(verification), &options->common.report)) return EXIT_USER;
+    const ReportOptions *report = &options->common.report;
+    if (report_has_document(report) && !report_write(journal_json(verification), report)) return EXIT_USER;
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
 
