@@ -224,11 +224,12 @@ Json *bench_json_open(const Device *device)
     char date[32] = "";
     if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
     uname(&host);
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     json_addf(
         json,
         "date %s host {name %s system %s release %s machine %s processors %zu} build {commit %s compiler %s}",
-        date, host.nodename, host.sysname, host.release, host.machine, (size_t)sysconf(_SC_NPROCESSORS_ONLN),
-        glint_commit(), glint_compiler());
+        date, host.nodename, host.sysname, host.release, host.machine,
+        (size_t)(processors > 0 ? processors : 0), glint_commit(), glint_compiler());
     return json;
 }
 
