@@ -68,7 +68,7 @@ TEST(event_times)
         LaunchTime time =
             launch_time_classify(cases[i].start, cases[i].end, cases[i].host, cases[i].resolution);
         assert_float_equal(time.event_seconds, cases[i].seconds, 1e-12);
-        assert_int_equal(time.trusted, cases[i].trusted);
+        assert_int_equal(!time.fault, cases[i].trusted);
         assert_true(time.host_seconds == cases[i].host);
     }
 }

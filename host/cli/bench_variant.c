@@ -20,7 +20,7 @@ static double build_seconds_with_launch(const RenderReport *report)
     double seconds = report->build_seconds;
     if (report->launches.count > 0) {
         const LaunchTime *first = &report->launches.items[0].time;
-        seconds += first->host_seconds - (first->trusted ? first->event_seconds : 0);
+        seconds += first->host_seconds - (first->fault ? 0 : first->event_seconds);
     }
     return seconds;
 }

@@ -97,7 +97,7 @@ void command_json(Json *json, const RenderReport *report, const LaunchTime *time
                    {"end_ms", time->end_seconds}};
     const double origin = report_origin(report, time->device);
     for (size_t i = 0; i < COUNT_OF(moments); i++) {
-        if (time->trusted && isfinite(origin) && moments[i].seconds > 0)
+        if (!time->fault && isfinite(origin) && moments[i].seconds > 0)
             json_number(json, moments[i].key, 1e3 * (moments[i].seconds - origin));
         else
             json_none(json, moments[i].key);

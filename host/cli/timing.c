@@ -20,7 +20,7 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
     LaunchSum sum = {.count = count};
     for (size_t i = 0; i < count; i++) {
         sum.host_seconds += launches[i].time.host_seconds;
-        if (launches[i].time.trusted)
+        if (!launches[i].time.fault)
             sum.event_seconds += launches[i].time.event_seconds;
         else
             sum.untrusted_count++;
@@ -32,7 +32,7 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
 // done something else, such as compiling.
 static double launch_delay(const LaunchTime *time)
 {
-    double delay = time->trusted ? time->host_seconds - time->event_seconds : 0;
+    double delay = time->fault ? 0 : time->host_seconds - time->event_seconds;
     return delay > 0.02 && delay > time->event_seconds ? delay : 0;
 }
 
@@ -158,7 +158,7 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
         const LaunchTime *time = &launches[i].time;
         json_begin_object(json, NULL);
         json_addf(json, "name %s clock %s event_ms %g host_ms %g", launches[i].name,
-                  time->trusted ? "event" : "host", time->trusted ? 1e3 * time->event_seconds : NAN,
+                  time->fault ? "host" : "event", time->fault ? NAN : 1e3 * time->event_seconds,
                   1e3 * time->host_seconds);
         command_json(json, report, time);
         if (time->fault) json_text(json, "doubt", time->fault);

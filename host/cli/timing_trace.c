@@ -53,7 +53,7 @@ static Commands commands_of(const RenderReport *report, const Device *device)
     for (size_t list = 0; list < 2; list++)
         for (size_t i = 0; i < commands.counts[list]; i++) {
             const LaunchTime *time = &commands.lists[list][i].time;
-            if (time->device == device && time->trusted)
+            if (time->device == device && !time->fault)
                 commands.device_to_host = fmin(commands.device_to_host, host_end(time) - time->end_seconds);
         }
     return commands;
@@ -66,13 +66,13 @@ static void command_add(Json *json, const Commands *commands, const NamedLaunch 
     const LaunchTime *time = &command->time;
     const double to_origin = commands->device_to_host - origin;
     const double start =
-        time->trusted ? time->start_seconds + commands->device_to_host : time->host_start_seconds;
+        time->fault ? time->host_start_seconds : time->start_seconds + commands->device_to_host;
     span_begin(json, command->name, thread, start - origin,
-               time->trusted ? time->event_seconds : time->host_seconds);
+               time->fault ? time->host_seconds : time->event_seconds);
     json_begin_object(json, "args");
-    json_addf(json, "clock %s called_us %g", time->trusted ? "event" : "host",
+    json_addf(json, "clock %s called_us %g", time->fault ? "host" : "event",
               1e6 * (time->host_start_seconds - origin));
-    if (time->trusted)
+    if (!time->fault)
         json_addf(json, "queued_us %g submitted_us %g", 1e6 * (time->queued_seconds + to_origin),
                   1e6 * (time->submitted_seconds + to_origin));
     if (time->dimensions > 0) counts_json(json, "work_items", time->global, time->dimensions);

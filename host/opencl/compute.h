@@ -136,10 +136,9 @@ cl_mem buffer_adopt(Compute *compute, size_t size, void *bytes);
 typedef struct {
     const Device *device; // its clock, which starts at an arbitrary moment, has the next four times
     double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0 if the runtime has none
-    double event_seconds;      // end - start; 0 where the runtime reports zeros
-    double host_seconds;       // from enqueue until the host sees it complete
-    double host_start_seconds; // clock_seconds() before the enqueue
-    bool trusted;
+    double event_seconds;       // end - start; 0 where the runtime reports zeros
+    double host_seconds;        // from enqueue until the host sees it complete
+    double host_start_seconds;  // clock_seconds() before the enqueue
     const char *fault;          // why the event's times are not trusted, or NULL if they are
     cl_uint dimensions;         // 0 if the command is not a kernel
     size_t global[3], local[3]; // work-items, and those of a group, which are 0 if the runtime chose

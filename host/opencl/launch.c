@@ -19,7 +19,6 @@ LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_second
                         .end_seconds = 1e-9 * (double)end,
                         .event_seconds = event_seconds,
                         .host_seconds = host_seconds,
-                        .trusted = !fault,
                         .fault = fault};
 }
 
@@ -53,7 +52,6 @@ LaunchTime event_time(Compute *compute, cl_event event, const char *command, dou
         time.host_start_seconds = host_start;
         const char *timer_fault = passport_timer_fault(compute->device);
         if (timer_fault) time.fault = timer_fault;
-        time.trusted = !time.fault;
     }
     clReleaseEvent(event);
     return time;

@@ -120,5 +120,5 @@ double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, con
                      group[0] * (dimensions > 1 ? group[1] : 1),
                      time.local[0] * (dimensions > 1 ? time.local[1] : 1));
     array_push(kernels->report->launches, ((NamedLaunch){kernels->is_rerender ? "re-render" : name, time}));
-    return time.trusted ? time.event_seconds : time.host_seconds;
+    return time.fault ? time.host_seconds : time.event_seconds;
 }

@@ -18,7 +18,7 @@ static double seconds_of(const NamedLaunch *launches, size_t count)
 {
     double seconds = 0;
     for (size_t i = 0; i < count; i++)
-        seconds += launches[i].time.trusted ? launches[i].time.event_seconds : launches[i].time.host_seconds;
+        seconds += launches[i].time.fault ? launches[i].time.host_seconds : launches[i].time.event_seconds;
     return seconds;
 }
 
