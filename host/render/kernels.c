@@ -4,6 +4,7 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/opencl/capture.h"
+#include "host/opencl/compose.h"
 #include <string.h>
 
 static const struct {
@@ -13,6 +14,11 @@ static const struct {
     [KERNEL_PATH] = {"path.cl", "path"},          [KERNEL_TRACE] = {"trace.cl", "trace"},
     [KERNEL_CLOSEST] = {"closest.cl", "closest"}, [KERNEL_COVERAGE] = {"coverage.cl", "coverage"},
 };
+
+char *kernels_text(const Kernels *kernels, KernelType type)
+{
+    return kernel_compose(kernel_files, kernel_sources[type].file, text_c(&kernels->variant.prelude));
+}
 
 static void variant_close(KernelVariant *variant, Compute *compute)
 {

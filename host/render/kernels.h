@@ -47,6 +47,8 @@ void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, co
 // Moves earlier kernels of the device to these, which must have none. The earlier have none afterwards.
 void kernels_adopt(Kernels *kernels, Kernels *earlier);
 void kernels_close(Kernels *kernels);
+// Returns the composed text of a kernel in the variant in use. The caller frees it.
+char *kernels_text(const Kernels *kernels, KernelType type);
 
 // Returns the kernel with the scene's arguments set, and builds it when first requested. Returns NULL if the
 // device failed.

@@ -3,7 +3,6 @@
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
-#include "host/opencl/compose.h"
 #include "host/render/arithmetic.h"
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
@@ -103,8 +102,7 @@ double renderer_color_max(const Renderer *renderer, const Scene *scene)
 
 char *renderer_kernel_text(const Renderer *renderer)
 {
-    const Text *prelude = &renderer->passes[PASS_ALL].kernels.variant.prelude;
-    return kernel_compose(kernel_files, "render.cl", text_c(prelude));
+    return kernels_text(&renderer->passes[PASS_ALL].kernels, KERNEL_RENDER);
 }
 
 uint64_t renderer_kernel_hash(const Renderer *renderer)
