@@ -273,7 +273,8 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
 {
     Progress progress;
     StepResult results[STEP_COUNT] = {0};
-    Text versions = report_versions(folder);
+    Scrubber scrubber = scrubber_open(folder);
+    Text versions = report_versions(&scrubber);
     variables_set(folder);
     progress_open(&progress, false);
     for (size_t i = 0; i < STEP_COUNT && !is_interrupted(); i++)
@@ -283,7 +284,8 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     if (!is_interrupted()) {
         MessageList messages = {0};
         Text lines = results_text(results, &messages);
-        const size_t count = report_archive_write(output, folder, &versions, text_c(&lines), &messages);
+        const size_t count =
+            report_archive_write(output, folder, &scrubber, &versions, text_c(&lines), &messages);
         status = count > 0 ? EXIT_DONE : EXIT_USER;
         messages_print(&messages, NULL);
         text_free(&lines);
@@ -292,6 +294,7 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     for (size_t i = 0; i < STEP_COUNT; i++)
         free(results[i].failure);
     text_free(&versions);
+    scrubber_close(&scrubber);
     return status;
 }
 

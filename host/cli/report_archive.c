@@ -3,7 +3,6 @@
 #include "host/api/version.h"
 #include "host/base/archive.h"
 #include "host/base/array.h"
-#include "host/cli/report_scrub.h"
 #include <dirent.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,7 +43,7 @@ typedef struct {
     size_t count;
     time_t now;
     const char *folder;
-    Scrubber scrubber;
+    const Scrubber *scrubber;
 } Archive;
 
 static void file_add(Archive *archive, const char *name, const Text *contents)
@@ -62,7 +61,7 @@ static void folder_file_add(Archive *archive, const char *name)
     MessageList ignored = {0};
     const char *ending = strrchr(name, '.');
     if (text_read_file(&contents, path, &ignored) && contents.count > 0) {
-        Text scrubbed = strcmp(ending, ".cl") == 0 ? contents : scrub(&archive->scrubber, &contents);
+        Text scrubbed = strcmp(ending, ".cl") == 0 ? contents : scrub(archive->scrubber, &contents);
         file_add(archive, name, &scrubbed);
         if (scrubbed.items != contents.items) text_free(&scrubbed);
     }
@@ -104,10 +103,10 @@ static Text index_text(const Archive *archive, const char *steps)
     return text;
 }
 
-size_t report_archive_write(OutputFile *output, const char *folder, const Text *versions, const char *steps,
-                            MessageList *messages)
+size_t report_archive_write(OutputFile *output, const char *folder, const Scrubber *scrubber,
+                            const Text *versions, const char *steps, MessageList *messages)
 {
-    Archive archive = {.now = time(NULL), .folder = folder, .scrubber = scrubber_open(folder)};
+    Archive archive = {.now = time(NULL), .folder = folder, .scrubber = scrubber};
     Text tar = {0};
     file_add(&archive, "versions.txt", versions);
     for (size_t i = 0; i < COUNT_OF(meanings); i++)
@@ -121,6 +120,5 @@ size_t report_archive_write(OutputFile *output, const char *folder, const Text *
     text_free(&index);
     text_free(&archive.tar);
     text_free(&archive.list);
-    scrubber_close(&archive.scrubber);
     return is_written ? archive.count + 1 : 0;
 }

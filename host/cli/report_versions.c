@@ -2,7 +2,6 @@
 
 #include "host/api/version.h"
 #include "host/base/array.h"
-#include "host/cli/report_scrub.h"
 #include <assimp/version.h>
 #include <jansson.h>
 #include <libfyaml.h>
@@ -70,10 +69,9 @@ static void variables_append(Text *text, const Scrubber *scrubber)
             }
 }
 
-Text report_versions(const char *folder)
+Text report_versions(const Scrubber *scrubber)
 {
     Text text = {0};
-    Scrubber scrubber = scrubber_open(folder);
     struct utsname host = {0};
     uname(&host);
     version_append(&text, "glint", glint_version());
@@ -85,7 +83,6 @@ Text report_versions(const char *folder)
     version_append(&text, "kernel release", host.release);
     version_append(&text, "machine", host.machine);
     text_appendf(&text, "%-20s %ld\n\n", "processors", sysconf(_SC_NPROCESSORS_ONLN));
-    variables_append(&text, &scrubber);
-    scrubber_close(&scrubber);
+    variables_append(&text, scrubber);
     return text;
 }
