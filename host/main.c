@@ -1,6 +1,7 @@
 // glint: the subcommands by name.
 #include "host/api/version.h"
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"

@@ -1,6 +1,7 @@
 // Replaces the process that reads a mesh by assimp. glint restarts its own program for it, here a test. If
 // the mesh's file has one of these names, the new process misbehaves as assimp might.
 #include "host/import/mesh/assimp_process.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 

@@ -1,5 +1,6 @@
 // Tests messages with their place, growing text, similar words, stages and hashes.
 #include "host/base/base64.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/stage.h"

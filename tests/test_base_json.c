@@ -1,4 +1,5 @@
 // Tests that every text and number of written JSON reads back as it was, with its type.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "tests/check.h"

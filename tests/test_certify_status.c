@@ -1,5 +1,6 @@
 // Tests the exit status of glint certify for a wrong image. One pixel of the rendered image is changed, or
 // the rendered scene differs from the certified one in what only a mirror shows.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/cli/commands.h"
 #include "host/render/renderer.h"

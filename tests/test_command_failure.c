@@ -1,4 +1,5 @@
 // Tests what a command prints, writes and exits with if an OpenCL call fails or its driver crashes.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/cli/commands.h"
 #include "tests/check.h"

@@ -1,5 +1,6 @@
 // Tests output files, which are written next to their target, synced and renamed: what replaces what, links,
 // failures, and processes that end while they write.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/output.h"
 #include "tests/check.h"

@@ -1,6 +1,7 @@
 #include "host/base/fault.h"
 
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 
 #include <assert.h>
 #include <pthread.h>

@@ -1,8 +1,6 @@
 // Bugs and lack of memory end the process. Everything else that fails is returned to the caller.
 #pragma once
 
-#include "host/base/exit_status.h"
-
 // Prints `glint: format…` to stderr and exits with EXIT_MACHINE. After fault_output_is_complete, prints a
 // warning and exits with that call's status.
 _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2)));

@@ -1,5 +1,6 @@
 #include "host/cli/command_line.h"
 
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"

@@ -1,5 +1,6 @@
 // glint render renders scene files, or frames of one, to images.
 #include "host/cli/render.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"

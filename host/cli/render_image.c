@@ -1,6 +1,7 @@
 // One image of glint render: its times, its bands and its files.
 #include "host/cli/render_image.h"
 #include "host/base/clock.h"
+#include "host/base/exit_status.h"
 #include "host/cli/checkpoint_key.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/progress.h"

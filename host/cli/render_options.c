@@ -1,5 +1,6 @@
 #include "host/cli/render_options.h"
 
+#include "host/base/exit_status.h"
 #include "host/base/file.h"
 #include <math.h>
 #include <stdio.h>

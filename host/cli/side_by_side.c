@@ -1,5 +1,6 @@
 #include "host/cli/side_by_side.h"
 
+#include "host/base/exit_status.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"

@@ -1,5 +1,6 @@
 // glint trace reads explicit rays and writes their hits as CSV.
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"

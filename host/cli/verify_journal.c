@@ -1,6 +1,7 @@
 #include "host/cli/verify_journal.h"
 
 #include "host/base/clock.h"
+#include "host/base/exit_status.h"
 #include "host/cli/interrupts.h"
 #include <errno.h>
 #include <signal.h>

@@ -1,5 +1,6 @@
 #include "host/mpi/first_rank.h"
 
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"

@@ -1,6 +1,7 @@
 #include "host/mpi/frames.h"
 
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"

@@ -3,6 +3,7 @@
 // in a thread. The others need neither the scene's files nor the output's folder.
 //
 // All ranks must be of one architecture and run the same program.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/cli/options.h"
 #include "host/import/mesh/assimp_process.h"

@@ -3,6 +3,7 @@
 // without assimp. The memory that a file claims is bounded by what it has.
 #include "tests/fuzz/readers.h"
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"

@@ -1,6 +1,7 @@
 // Reads meshes through assimp without its post-processing. Its vertex joining and normal generation use
 // absolute distances, which distorts small meshes. Its triangulation reads missing vertices and drops parts
 // of concave polygons.
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"

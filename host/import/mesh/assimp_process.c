@@ -1,5 +1,6 @@
 #include "host/import/mesh/assimp_process.h"
 #include "host/base/array.h"
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
 
 #include <errno.h>
