@@ -44,7 +44,7 @@ static bool color_read(DatReader *reader, Color *color)
     Color read;
     const size_t offset = value_peek(&reader->line).offset;
     if (!line_vector(&reader->line, "color", NULL, &read)) return false;
-    if (color_is_sound(read))
+    if (numbers_are_sound(read))
         *color = read;
     else
         dat_warn(reader, offset, "'color' must be 0 or more: the default is used");

@@ -109,7 +109,7 @@ static bool light_end(DatReader *reader, Light light)
     const size_t offset = value_peek(&reader->line).offset;
     if (!dat_expect(reader, "color") || !line_vector(&reader->line, "color", NULL, &light.color))
         return false;
-    if (!color_is_sound(light.color))
+    if (!numbers_are_sound(light.color))
         return report_error(&reader->report, offset, "'color' must be 0 or more");
     if (light.type != LIGHT_POINT && vector_is_zero(light.direction))
         return report_error(&reader->report, offset, "'direction' must not be zero");

@@ -111,9 +111,14 @@ bool range_holds(const Range *range, double value)
                        : value >= range->low && value <= range->high;
 }
 
-bool color_is_sound(Vector3 color)
+bool number_is_sound(double number)
 {
-    return vector_is_within(color, NUMBER_MAX) && vector_is_zero(vector_min(color, vector_all(0)));
+    return number >= 0 && number <= NUMBER_MAX;
+}
+
+bool numbers_are_sound(Vector3 numbers)
+{
+    return number_is_sound(numbers.x) && number_is_sound(numbers.y) && number_is_sound(numbers.z);
 }
 
 int word_shown(Word word)

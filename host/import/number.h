@@ -37,8 +37,9 @@ typedef struct {
 extern const Range range_positive, range_not_negative, range_unit, range_byte, range_half_turn, range_pixels;
 
 bool range_holds(const Range *range, double value);
-// Returns whether each component is 0 or more and at most NUMBER_MAX.
-bool color_is_sound(Vector3 color);
+// Return whether a number, or each component of a vector, is 0 or more and at most NUMBER_MAX.
+bool number_is_sound(double number);
+bool numbers_are_sound(Vector3 numbers);
 
 // Reads the number called `name` from a whole word. Reports an error and returns false if it is invalid. A
 // `range` of NULL allows any number.

@@ -63,7 +63,7 @@ static Color color_of(const Importer *importer, const char *key, unsigned type, 
     if (aiGetMaterialColor(importer->material, key, type, index, &color) != aiReturn_SUCCESS)
         return otherwise;
     const Color read = {color.r, color.g, color.b};
-    if (color_is_sound(read)) return read;
+    if (numbers_are_sound(read)) return read;
     warn_default(importer, "color");
     return otherwise;
 }

@@ -1,4 +1,4 @@
-// Writes and reads the reply of a process that reads a mesh: a header, arrays, and a mark at the end.
+// Writes and reads the reply of a process that reads a mesh. It has a header, arrays, and a mark at the end.
 #include "host/base/array.h"
 #include "host/import/mesh/assimp_process.h"
 #include "host/import/number.h"
@@ -194,19 +194,15 @@ static bool textures_add(MeshDraft *draft, const ReplyLists *lists, uint32_t tex
     return at == all->count;
 }
 
-static bool number_is_sound(double number)
-{
-    return number >= 0 && number <= NUMBER_MAX;
-}
-
 // Copies the members of a material that assimp_read sets. Returns false if one is out of range.
 static bool material_copy(const Material *from, const uint32_t *textures, size_t texture_count,
                           Material *material)
 {
     const uint32_t texture = from->image.texture;
-    if (!color_is_sound(from->color) || !color_is_sound(from->diffuse) || !color_is_sound(from->emission) ||
-        !number_is_sound(from->ambient) || !number_is_sound(from->specular.largest) ||
-        !number_is_sound(from->shininess) || !range_holds(&range_unit, from->transmission.largest) ||
+    if (!numbers_are_sound(from->color) || !numbers_are_sound(from->diffuse) ||
+        !numbers_are_sound(from->emission) || !number_is_sound(from->ambient) ||
+        !number_is_sound(from->specular.largest) || !number_is_sound(from->shininess) ||
+        !range_holds(&range_unit, from->transmission.largest) ||
         !(from->ior > 0 && from->ior <= NUMBER_MAX) || texture > texture_count ||
         from->image.wraps[0] > TEXTURE_MIRRORED || from->image.wraps[1] > TEXTURE_MIRRORED)
         return false;

@@ -122,7 +122,7 @@ bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const 
     return index_read(gltf, &item, array, index);
 }
 
-static bool number_is_sound(const json_t *json)
+static bool json_number_is_sound(const json_t *json)
 {
     return json_is_number(json) && fabs(json_number_value(json)) <= NUMBER_MAX;
 }
@@ -133,7 +133,7 @@ bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t coun
     if (!member.json) return true;
     bool is_sound = count == 1 || json_array_size(member.json) == count;
     for (size_t i = 0; i < count && is_sound; i++)
-        is_sound = number_is_sound(count == 1 ? member.json : json_array_get(member.json, i));
+        is_sound = json_number_is_sound(count == 1 ? member.json : json_array_get(member.json, i));
     if (!is_sound && count == 1) return gltf_fails(gltf, &member, "must be a number up to %g", NUMBER_MAX);
     if (!is_sound) return gltf_fails(gltf, &member, "must be %zu numbers up to %g", count, NUMBER_MAX);
     for (size_t i = 0; i < count; i++)

@@ -62,7 +62,7 @@ static bool light_is_sound(const Light *light)
                           light->spot.penumbra >= 0 && light->spot.penumbra <= light->spot.half_angle;
     return light->type <= LIGHT_SPOT && light->area.type == AREA_NONE &&
            vector_is_within(light->position, NUMBER_MAX) && vector_is_within(light->direction, NUMBER_MAX) &&
-           color_is_sound(light->color) &&
+           numbers_are_sound(light->color) &&
            (light->type == LIGHT_POINT || !vector_is_zero(light->direction)) &&
            (light->type != LIGHT_SPOT || has_cone);
 }
@@ -71,7 +71,7 @@ static bool light_is_sound(const Light *light)
 // color. Returns false if those of a light that has a position are invalid.
 static bool fading_check(Light *light)
 {
-    const bool is_sound = color_is_sound((Vector3){light->fading[0], light->fading[1], light->fading[2]});
+    const bool is_sound = numbers_are_sound((Vector3){light->fading[0], light->fading[1], light->fading[2]});
     if (!is_sound || light->type == LIGHT_DIRECTIONAL) memset(light->fading, 0, sizeof light->fading);
     light_fold_fading(light);
     return is_sound || light->type == LIGHT_DIRECTIONAL;

@@ -7,8 +7,8 @@
 #include <string.h>
 #include <strings.h>
 
-// COMPARED_MAX bounds the cost of a wrong name in a hostile file. A message lists at most LISTED_MAX names.
-enum { FIELDS_MAX = 32, COMPARED_MAX = 1000, LISTED_MAX = 20 };
+// A message lists at most LISTED_MAX names.
+enum { FIELDS_MAX = 32, LISTED_MAX = 20 };
 
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
@@ -56,12 +56,12 @@ size_t name_find(Names names, const char *name)
 // Returns the name that `word` may stand for, or NULL.
 static const char *name_meant(const char *word, Names names)
 {
-    const char *compared[COMPARED_MAX];
+    const char *compared[NAMES_COMPARED_MAX];
     size_t count = 0;
     for (size_t i = 0; i < COUNT_OF(synonyms); i++)
         if (!strcasecmp(word, synonyms[i].word) && name_find(names, synonyms[i].known) < names.count)
             return synonyms[i].known;
-    for (; count < COMPARED_MAX && count < names.count; count++)
+    for (; count < NAMES_COMPARED_MAX && count < names.count; count++)
         compared[count] = name_at(names, count);
     return strlen(word) <= WORD_SHOWN ? text_nearest(word, compared, count) : NULL;
 }

@@ -7,6 +7,7 @@
 #include "host/import/place.h"
 #include "host/import/yaml/tree.h"
 #include "host/scene/scene.h"
+#include <stddef.h>
 
 typedef struct {
     const char *name; // in the tree's texts
@@ -109,6 +110,13 @@ typedef struct {
     const void *items;
     size_t count, size;
 } Names;
+
+_Static_assert(offsetof(MaterialName, name) == 0 && offsetof(Definition, name) == 0 &&
+                   offsetof(Field, name) == 0,
+               "Names reads the name at the beginning of an item");
+
+// Bounds the cost of a wrong name in a hostile file.
+enum { NAMES_COMPARED_MAX = 1000 };
 
 #define NAMES_OF(array) ((Names){(array), COUNT_OF(array), sizeof *(array)})
 

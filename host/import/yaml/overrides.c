@@ -6,9 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Bounds the cost of a wrong name.
-enum { NAMES_COMPARED = 1000 };
-
 // The path from the document's root to a node, as far as an override's PATH has been read.
 typedef struct {
     YamlTree *tree;
@@ -88,10 +85,10 @@ static bool can_add(const Path *path)
 // Reports a missing name. A new name within a path is probably a mistake.
 static bool missing_report(const Path *path, const char *name, size_t start)
 {
-    const char *known[NAMES_COMPARED];
+    const char *known[NAMES_COMPARED_MAX];
     size_t known_count = 0;
     for (const YamlNode *key = yaml_first(path->tree, node_at(path, path->node));
-         key && known_count < NAMES_COMPARED; key = yaml_next(path->tree, yaml_next(path->tree, key)))
+         key && known_count < NAMES_COMPARED_MAX; key = yaml_next(path->tree, yaml_next(path->tree, key)))
         if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
     Text choices = {0};
     choices_describe(&choices, name, (Names){known, known_count, sizeof *known});
