@@ -98,7 +98,7 @@ typedef struct {
 } FilmComparison;
 
 // Returns the error of the channel in which a pixel's colors differ most, and its values.
-static AccuracyWorst color_error(const FilmComparison *comparison, size_t pixel)
+static AccuracyWorst color_worst(const FilmComparison *comparison, size_t pixel)
 {
     AccuracyWorst worst = {.error = -1};
     for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
@@ -138,7 +138,7 @@ static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, 
     worst_record(comparison, type, pixel,
                  &(AccuracyWorst){.away = !edge,
                                   .light = light,
-                                  .error = color_error(comparison, pixel).error,
+                                  .error = color_worst(comparison, pixel).error,
                                   .reference = values[0],
                                   .variant = values[1]});
 }
@@ -199,7 +199,7 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
 
 static void color_error_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
 {
-    const AccuracyWorst candidate = color_error(comparison, pixel);
+    const AccuracyWorst candidate = color_worst(comparison, pixel);
     if (candidate.error > 0) worst_record(comparison, type, pixel, &candidate);
 }
 
