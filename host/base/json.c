@@ -114,13 +114,6 @@ void json_number(Json *json, const char *key, double value)
     json_word(json, key, isfinite(value) ? text_number(value, 1).text : "null");
 }
 
-void json_int64(Json *json, const char *key, int64_t value)
-{
-    char word[32];
-    snprintf(word, sizeof word, "%" PRId64, value);
-    json_word(json, key, word);
-}
-
 void json_count(Json *json, const char *key, uint64_t value)
 {
     char word[32];

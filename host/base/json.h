@@ -15,7 +15,6 @@ void json_begin_array(Json *json, const char *key);
 void json_end(Json *json);                                      // ends the innermost object or array
 void json_text(Json *json, const char *key, const char *value); // NULL value: null
 void json_number(Json *json, const char *key, double value);    // shortest that reads back; NaN, inf: null
-void json_int64(Json *json, const char *key, int64_t value);
 void json_count(Json *json, const char *key, uint64_t value);
 void json_bool(Json *json, const char *key, bool value);
 void json_none(Json *json, const char *key);

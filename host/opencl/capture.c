@@ -68,7 +68,7 @@ static bool argument_write(Compute *compute, Json *json, const CapturedArgument 
 {
     bool is_written = true;
     json_begin_object(json, NULL);
-    json_int64(json, "index", argument->index);
+    json_count(json, "index", argument->index);
     if (argument->is_buffer) {
         cl_mem buffer;
         memcpy(&buffer, text_c(&argument->value), sizeof buffer);
@@ -88,7 +88,7 @@ static void sizes_write(Json *json, const char *key, cl_uint dimensions, const s
     if (!sizes) return;
     json_begin_array(json, key);
     for (cl_uint i = 0; i < dimensions; i++)
-        json_int64(json, NULL, (int64_t)sizes[i]);
+        json_count(json, NULL, sizes[i]);
     json_end(json);
 }
 

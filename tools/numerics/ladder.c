@@ -246,12 +246,12 @@ static void tally_write(const Tally *tally, const char *shape, Precision precisi
     json_text(json, "shape", shape);
     json_text(json, "precision", precision_names[precision]);
     json_number(json, "distance", distance);
-    json_int64(json, "rays", (int64_t)tally->compared);
+    json_count(json, "rays", tally->compared);
     json_begin_object(json, "steep");
     json_number(json, "max", tally->steep_ulps);
     json_end(json);
-    json_int64(json, "wrong", (int64_t)tally->wrong);
-    json_int64(json, "uncertain", (int64_t)tally->uncertain);
+    json_count(json, "wrong", tally->wrong);
+    json_count(json, "uncertain", tally->uncertain);
     json_number(json, "bound_fraction", tally->bound_fraction);
     json_end(json);
 }
