@@ -73,7 +73,9 @@ bool compute_check_reference(Compute *compute)
 
 bool compute_check(Compute *compute, cl_int status, const char *call)
 {
-    return compute_check_object(compute, compute, status, call);
+    fault_record_call(NULL);
+    if (status != CL_SUCCESS) failure_keep(compute, call, status, NULL);
+    return compute_ok(compute);
 }
 
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call)

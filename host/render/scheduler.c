@@ -91,7 +91,10 @@ static double share_of(const Scheduler *scheduler, size_t worker)
 static void rows_set_free(Scheduler *scheduler, BandRows rows, bool is_free)
 {
     memset(scheduler->is_free + rows.first_row, is_free, rows.row_count);
-    scheduler->free_count += is_free ? rows.row_count : -rows.row_count;
+    if (is_free)
+        scheduler->free_count += rows.row_count;
+    else
+        scheduler->free_count -= rows.row_count;
 }
 
 // Returns the uppermost free rows, up to the first row that is not free.
