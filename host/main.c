@@ -9,7 +9,6 @@
 #include "host/import/load.h"
 #include "host/import/mesh/assimp_process.h"
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -97,10 +96,7 @@ int main(int argument_count, char **arguments)
 {
     const int child_status = assimp_process_main(argument_count, arguments);
     if (child_status >= 0) return child_status;
-    // a failed write is reported like a full disk, and no partial output is left
-    signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN);
-    signal(SIGCHLD, SIG_DFL); // if it is ignored, the system keeps no exit status
+    signals_prepare();
     interrupts_catch();
     fault_catch_crashes();
     int status = command_run(argument_count, arguments);

@@ -24,6 +24,14 @@ static void interrupt_record(int signal_number)
 
 static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
 
+void signals_prepare(void)
+{
+    // a failed write is reported like a full disk, and no partial output is left
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGCHLD, SIG_DFL); // if it is ignored, the system keeps no exit status
+}
+
 void interrupts_ignore(void)
 {
     for (size_t i = 0; i < COUNT_OF(signals); i++)

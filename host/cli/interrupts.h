@@ -1,8 +1,11 @@
-// Handles SIGINT, SIGTERM and SIGHUP, the signals by which the user interrupts a command.
+// Handles signals, above all SIGINT, SIGTERM and SIGHUP, by which the user interrupts a command.
 #pragma once
 
 #include <stdbool.h>
 
+// Makes failed writes and ended child processes return their status, whatever the parent does with SIGPIPE,
+// SIGXFSZ and SIGCHLD.
+void signals_prepare(void);
 // Makes the signals end the process with EXIT_INTERRUPTED, except for those that the parent ignores, as nohup
 // and a shell's background jobs do. Must be called first.
 void interrupts_catch(void);

@@ -9,7 +9,6 @@
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -240,8 +239,6 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
                    .items = memory_allocate_zeroed(other_count, sizeof *ranks.items),
                    .begin = ranks_begin,
                    .start = ranks_start};
-    signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN);
     interrupts_catch();
     fault_catch_crashes();
     int status = EXIT_USER;

@@ -5,6 +5,7 @@
 // All ranks must be of one architecture and run the same program.
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/import/mesh/assimp_process.h"
 #include "host/mpi/first_rank.h"
@@ -19,6 +20,7 @@ int main(int argument_count, char **arguments)
     MPI_Comm local;
     MPI_Init_thread(&argument_count, &arguments, MPI_THREAD_FUNNELED, &level);
     if (level < MPI_THREAD_FUNNELED) fault("this MPI cannot be used by a program with threads");
+    signals_prepare();
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &size);
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank, MPI_INFO_NULL, &local);
