@@ -31,4 +31,4 @@ char *counts_describe(const RerenderCounts *counts);
 // `certified`.
 void image_notes_add_all(ImageNotes *notes, const ImageOrigin *origin, const ImageOutputOptions *options,
                          ImageFormat format, const RerenderCounts *counts);
-void image_notes_free(ImageNotes *notes);
+void image_notes_free(ImageNotes *notes); // frees the values

@@ -98,8 +98,8 @@ Word value_word(Line *line);
 Word line_rest(Line *line);
 // Moves to the end of the line.
 void line_skip(Line *line);
-// Each of these returns false at the end of the source: line_next moves to the next line, line_next_filled to
-// the next one that has a word, and line_reach_word does so unless words are left on this line.
+// line_next moves to the next line, line_next_filled to the next one that has a word, and line_reach_word
+// does the latter unless words are left on this line. Each returns false at the end of the source.
 bool line_next(Line *line);
 bool line_next_filled(Line *line);
 bool line_reach_word(Line *line);

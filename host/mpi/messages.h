@@ -34,7 +34,7 @@ enum {
     TAG_BAND,       // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,     // a layer, in several messages if it is large
     TAG_END,        // no bytes
-    TAG_DONE,       // a rank's last message, why its device failed or an empty text
+    TAG_DONE,       // a rank's last message, which states why its device failed, or is empty
     TAG_FRAME_DONE, // the status of a rank's frame; EXIT_DONE before the first
     TAG_FRAME,      // the index of the next frame, or NO_FRAME
 };
@@ -74,7 +74,7 @@ bool end_poll(void *has_ended);
 // Waits for TAG_END unless it was received.
 void end_await(bool *has_ended);
 
-// Sends a compiled scene, without what only moves of the scene read, from the first rank to the others with
-// `takes`, which allocate its arrays. All ranks call it, the first with `takes`. A rank that does not take
-// the scene leaves `compiled` unchanged.
+// Sends a compiled scene from the first rank to the others that call with `takes`, which allocate its arrays.
+// All ranks call it, the first one with `takes`. A rank that does not take the scene leaves `compiled`
+// unchanged. Arrays that only a move of the scene reads are not sent.
 void scene_broadcast(CompiledScene *compiled, bool takes);

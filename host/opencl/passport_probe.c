@@ -23,8 +23,8 @@ ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_
                             .no_cache = no_cache};
 }
 
-// Releases the program without storing the program. The passport is stored instead, and a
-// driver that crashes when asked for a binary would prevent the render.
+// Releases the program without storing it. The passport is stored instead, and a driver that crashes when
+// asked for a binary would prevent the render.
 void probe_kernel_close(Measurement *measurement)
 {
     program_close(&measurement->program);

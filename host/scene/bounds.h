@@ -12,7 +12,7 @@ static inline Bounds bounds_empty(void)
     return (Bounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 }
 
-// Returns the bounds of what is unbounded.
+// Returns infinite bounds, those of an unbounded shape.
 static inline Bounds bounds_everywhere(void)
 {
     return (Bounds){{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
