@@ -92,7 +92,7 @@ static bool variant_read(BenchOptions *options, size_t index)
 }
 
 // Reads the variants, which start from the options of all rows.
-static bool effect_variants(const Option *option, void *bench_options)
+static bool variants_read(const Option *option, void *bench_options)
 {
     BenchOptions *options = bench_options;
     (void)option;
@@ -125,7 +125,7 @@ static const Option command_options[] = {
      "--bvh, "
      "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
      "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
-     option_texts, offsetof(BenchOptions, variant_texts), .effect = effect_variants}};
+     option_texts, offsetof(BenchOptions, variant_texts), .effect = variants_read}};
 
 static const char *options_check(void *bench_options)
 {

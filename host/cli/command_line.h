@@ -11,8 +11,8 @@ typedef struct Option Option;
 // Stores an option's value in the command's options, and has no other effect. On a mistake prints what the
 // option expects and returns false.
 typedef bool OptionReader(const Option *option, const char *value, void *options);
-// Carries out what a stored value asks for before the command starts, such as a new folder. Returns false
-// with a message if that fails or the value does not suit the other options.
+// Carries out what a stored value asks for before the command starts, such as a new folder, or only checks
+// the value together with the other options. Returns false with a message if it fails.
 typedef bool OptionEffect(const Option *option, void *options);
 
 // Checks options together. Returns the mistake, which the caller prints as a usage error, or NULL if there is

@@ -18,7 +18,7 @@ typedef struct {
     bool writes_camera;
 } ViewOptions;
 
-static bool effect_camera_file(const Option *option, void *view_options)
+static bool camera_file_check(const Option *option, void *view_options)
 {
     const ViewOptions *options = view_options;
     const char *camera = options->common.scene.camera ? options->common.scene.camera : options->scene;
@@ -36,7 +36,7 @@ static const Option command_options[] = {
     {"samples", "N", "samples per pixel once the camera rests (default: 16)", option_count,
      offsetof(ViewOptions, sample_count), NUMBERS(1, SAMPLES_MAX)},
     {"write-camera", NULL, "C and K write the camera into its file, which is YAML", option_flag,
-     offsetof(ViewOptions, writes_camera), .effect = effect_camera_file}};
+     offsetof(ViewOptions, writes_camera), .effect = camera_file_check}};
 
 static void keys_print(void)
 {
