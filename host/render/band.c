@@ -5,7 +5,8 @@
 #include "host/compile/features.h"
 #include <stdlib.h>
 
-static const uint64_t RECORDS_SIZE_MAX = 1 << 27;
+// Holds a sample of 1280x720 pixels if rays are refracted (RECORDED_NODES_OF in kernels/types.h).
+static const uint64_t RECORDS_SIZE_MAX = 1 << 27; // in bytes
 
 enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
 

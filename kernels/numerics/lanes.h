@@ -3,7 +3,7 @@
 // Above this file, code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both.
 //
-// The host defines these macros before the text (prelude_write in host/render/renderer_kernels.c):
+// The host defines these macros before the text (prelude_of in host/render/pass.c):
 //     LANES            1, 4, 8 or 16
 //     IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
 //     IS_CERTIFIED     1: every decision has a bound on its error (shapes/certain.h)
