@@ -16,8 +16,7 @@ typedef struct {
     char *channels; // names, each ended by a null
     size_t channel_count;
     bool is_integer;
-    uint8_t *queue;      // of rows, until there are enough for all blocks
-    const uint8_t *rows; // to compress: the queue, or the caller's if these suffice
+    uint8_t *rows_held; // of a block that is not complete
 } WrittenLayer;
 
 // A channel of the file and the indices of its layer and of its value in each pixel.
@@ -28,7 +27,7 @@ typedef struct {
 
 enum { VALUE_BYTES = 4, BLOCKS_MAX = 16 };
 
-// A block of rows, which a thread compresses. The pipelines' buffers have about twice the size of the queue.
+// A block of rows in the queue, which threads compress. A queue's buffers have about twice its rows' size.
 typedef struct {
     exr_encode_pipeline_t pipeline;
     bool has_pipeline; // kept and reused
@@ -38,14 +37,14 @@ typedef struct {
 typedef struct {
     exr_context_t context;
     ExrBlock blocks[BLOCKS_MAX];
+    size_t block_count;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
     exr_result_t (*write)(exr_encode_pipeline_t *pipeline);    // the library's
     WrittenLayer layers[1 + IMAGE_LAYERS_MAX];
     size_t layer_count;
     ExrChannel *channels; // of all layers, by name, as in the file
     size_t channel_count;
-    uint32_t block_rows, queue_size; // in rows
-    uint32_t queued_rows, written_rows;
+    uint32_t block_rows, rows_held, block_start;
     int write_error; // errno of a failed write
 } ExrWriter;
 
@@ -185,26 +184,28 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
                              writer->output.target);
     exr_result_t code = exr_header(writer);
     if (code != EXR_ERR_SUCCESS) return exr_write_failed(writer, code, messages);
-    state->queue_size = BLOCKS_MAX * state->block_rows;
-    if (state->queue_size > header->height) state->queue_size = header->height;
     for (size_t i = 0; i < state->layer_count; i++)
-        state->layers[i].queue =
-            memory_allocate(state->queue_size, layer_row_size(writer, &state->layers[i]));
+        state->layers[i].rows_held =
+            memory_allocate(state->block_rows, layer_row_size(writer, &state->layers[i]));
     return true;
 }
 
-// Points a channel of the file at its values from a row on, counted from the first that was not written.
-static void channel_place(const ImageWriter *writer, exr_encode_pipeline_t *pipeline, uint32_t first_row,
-                          int index)
+// The rows of a block by layer, in the caller's arrays or in rows_held.
+typedef struct {
+    const uint8_t *layers[1 + IMAGE_LAYERS_MAX];
+} BlockRows;
+
+// Points a channel of the file at its values in the block's rows.
+static void channel_place(const ExrWriter *state, exr_encode_pipeline_t *pipeline, const BlockRows *rows,
+                          int index, uint32_t width)
 {
-    const ExrWriter *state = writer->state;
     const ExrChannel *from = &state->channels[index];
     const WrittenLayer *layer = &state->layers[from->layer];
     exr_coding_channel_info_t *channel = &pipeline->channels[index];
-    const size_t row_size = layer_row_size(writer, layer);
-    channel->encode_from_ptr = layer->rows + first_row * row_size + from->value * VALUE_BYTES;
-    channel->user_pixel_stride = (int32_t)(layer->channel_count * VALUE_BYTES);
-    channel->user_line_stride = (int32_t)row_size;
+    const size_t pixel_bytes = layer->channel_count * VALUE_BYTES;
+    channel->encode_from_ptr = rows->layers[from->layer] + from->value * VALUE_BYTES;
+    channel->user_pixel_stride = (int32_t)pixel_bytes;
+    channel->user_line_stride = (int32_t)(pixel_bytes * width);
     channel->user_bytes_per_element = VALUE_BYTES;
     channel->user_data_type = layer->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
 }
@@ -227,6 +228,18 @@ static void blocks_compress(void *context, size_t begin, size_t end)
         state->blocks[i].code = exr_encoding_run(state->context, 0, &state->blocks[i].pipeline);
 }
 
+static exr_result_t blocks_write(ExrWriter *state)
+{
+    exr_result_t code = EXR_ERR_SUCCESS;
+    parallel_run(state->block_count, 1, blocks_compress, state);
+    for (size_t i = 0; i < state->block_count; i++) {
+        EXR_STEP(code, state->blocks[i].code);
+        EXR_STEP(code, state->write(&state->blocks[i].pipeline));
+    }
+    state->block_count = 0;
+    return code;
+}
+
 // Lets the library choose a pipeline's functions for packing, compressing and writing. Postpones writing to
 // the file's order, because the default functions fail for any block but the next.
 static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pipeline)
@@ -240,40 +253,42 @@ static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pi
     return code;
 }
 
-// Sets up the pipeline of a block, whose rows begin at `first_row` of those that were not written.
-static exr_result_t block_prepare(const ImageWriter *writer, ExrBlock *block, uint32_t first_row)
+// Queues a block, and writes the queue if it is full. The rows must stay valid until then.
+static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;
+    ExrBlock *block = &state->blocks[state->block_count];
     exr_encode_pipeline_t *pipeline = &block->pipeline;
     exr_chunk_info_t chunk;
-    const int y = (int)(writer->header.top + state->written_rows + first_row);
-    exr_result_t code = exr_write_scanline_chunk_info(state->context, 0, y, &chunk);
+    exr_result_t code = exr_write_scanline_chunk_info(state->context, 0,
+                                                      (int)(writer->header.top + state->block_start), &chunk);
     const bool is_first = !block->has_pipeline;
     EXR_STEP(code, is_first ? exr_encoding_initialize(state->context, 0, &chunk, pipeline)
                             : exr_encoding_update(state->context, 0, &chunk, pipeline));
     if (code != EXR_ERR_SUCCESS) return code;
     block->has_pipeline = true;
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(writer, pipeline, first_row, i);
-    return is_first ? pipeline_prepare(state, pipeline) : code;
+        channel_place(state, pipeline, rows, i, writer->header.width);
+    if (is_first) code = pipeline_prepare(state, pipeline);
+    if (code != EXR_ERR_SUCCESS) return code;
+    state->block_count++;
+    state->block_start += row_count;
+    state->rows_held = 0;
+    if (state->block_count == BLOCKS_MAX) EXR_STEP(code, blocks_write(state));
+    return code;
 }
 
-// Compresses the queued rows and writes them.
-static exr_result_t queue_write(ImageWriter *writer)
+// Copies rows into rows_held. First writes the queue, which may still refer to rows_held.
+static exr_result_t rows_hold(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;
-    exr_result_t code = EXR_ERR_SUCCESS;
-    uint32_t block_count = 0;
-    for (uint32_t row = 0; row < state->queued_rows; row += state->block_rows)
-        EXR_STEP(code, block_prepare(writer, &state->blocks[block_count++], row));
-    if (code != EXR_ERR_SUCCESS) return code;
-    parallel_run(block_count, 1, blocks_compress, state);
-    for (uint32_t i = 0; i < block_count; i++) {
-        EXR_STEP(code, state->blocks[i].code);
-        EXR_STEP(code, state->write(&state->blocks[i].pipeline));
+    const exr_result_t code = state->rows_held == 0 ? blocks_write(state) : EXR_ERR_SUCCESS;
+    for (size_t i = 0; i < state->layer_count; i++) {
+        const size_t row_size = layer_row_size(writer, &state->layers[i]);
+        memcpy(state->layers[i].rows_held + state->rows_held * row_size, rows->layers[i],
+               row_count * row_size);
     }
-    state->written_rows += state->queued_rows;
-    state->queued_rows = 0;
+    state->rows_held += row_count;
     return code;
 }
 
@@ -282,20 +297,25 @@ static bool exr_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
 {
     ExrWriter *state = writer->state;
     exr_result_t code = EXR_ERR_SUCCESS;
-    for (uint32_t row = 0, count; row < row_count && code == EXR_ERR_SUCCESS; row += count) {
-        const uint32_t room = state->queue_size - state->queued_rows;
-        count = row_count - row < room ? row_count - row : room;
-        for (size_t i = 0; i < state->layer_count; i++) {
-            WrittenLayer *layer = &state->layers[i];
-            const size_t size = layer_row_size(writer, layer);
-            const uint8_t *from = (const uint8_t *)arrays[i] + row * size;
-            const bool is_full = count == state->queue_size;
-            if (!is_full) memcpy(layer->queue + state->queued_rows * size, from, count * size);
-            layer->rows = is_full ? from : layer->queue;
+    BlockRows held;
+    for (size_t i = 0; i < state->layer_count; i++)
+        held.layers[i] = state->layers[i].rows_held;
+    for (uint32_t row = 0, taken; row < row_count && code == EXR_ERR_SUCCESS; row += taken) {
+        const uint32_t left = writer->header.height - state->block_start;
+        const uint32_t block_rows = left < state->block_rows ? left : state->block_rows;
+        BlockRows rows;
+        for (size_t i = 0; i < state->layer_count; i++)
+            rows.layers[i] = (const uint8_t *)arrays[i] + row * layer_row_size(writer, &state->layers[i]);
+        taken = block_rows - state->rows_held;
+        if (taken > row_count - row) taken = row_count - row;
+        if (taken == block_rows) {
+            code = block_add(writer, &rows, block_rows);
+        } else {
+            code = rows_hold(writer, &rows, taken);
+            if (state->rows_held == block_rows) EXR_STEP(code, block_add(writer, &held, block_rows));
         }
-        state->queued_rows += count;
-        if (state->queued_rows == state->queue_size) code = queue_write(writer);
     }
+    EXR_STEP(code, blocks_write(state));
     return code == EXR_ERR_SUCCESS || exr_write_failed(writer, code, messages);
 }
 
@@ -310,8 +330,7 @@ static exr_result_t exr_close(ExrWriter *state)
 
 static bool exr_end(ImageWriter *writer, MessageList *messages)
 {
-    exr_result_t code = queue_write(writer);
-    EXR_STEP(code, exr_close(writer->state));
+    exr_result_t code = exr_close(writer->state);
     return code == EXR_ERR_SUCCESS || exr_write_failed(writer, code, messages);
 }
 
@@ -322,7 +341,7 @@ static void exr_free(ImageWriter *writer)
     exr_close(state);
     for (size_t i = 0; i < state->layer_count; i++) {
         free(state->layers[i].channels);
-        free(state->layers[i].queue);
+        free(state->layers[i].rows_held);
     }
     free(state->channels);
     free(state);
