@@ -54,9 +54,9 @@ static const Pair pairs[] = {
     {"box", "[{box: {min: [0, 0, 0], max: [1, 2, 3], transform: {rotate: [0, 90, 0], scale: [1, -1, 1]}}}]",
      "[{box: {min: [0, -2, -1], max: [3, 0, 0]}}]"},
     {"turned box",
-     "[{group: {transform: {rotate: [0, 0, -45]}, objects: [{box: {min: [-1, -1, -1], max: [1, 1, 1], "
+     "[{group: {transform: {rotate: [0, 0, -45]}, objects: [{box: {min: [-1.1, -1, -1], max: [1, 1, 1], "
      "transform: {rotate: [0, 0, 45]}}}]}}]",
-     "[{box: {min: [-1, -1, -1], max: [1, 1, 1]}}]"},
+     "[{box: {min: [-1.1, -1, -1], max: [1, 1, 1]}}]"},
     {"cylinder",
      "[{cylinder: {from: [0, 0, 0], to: [0, 1, 0], radius: 1, transform: {scale: [0.5, 3, 0.5], rotate: [0, "
      "0, 90]}}}]",

@@ -6,6 +6,8 @@
 #include "host/scene/oval.h"
 #include "host/scene/shape_members.h"
 
+#include <string.h>
+
 static const double NUMBER_LARGEST = 1e30; // of scene files
 
 // A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
@@ -59,6 +61,7 @@ static void box_make_mesh(Scene *scene, Object *object)
     for (unsigned i = 0; i < 8; i++)
         mesh.vertices[i] = bounds_corner((Bounds){object->as.box.min, object->as.box.max}, i);
     object->type = SHAPE_MESH;
+    memset(&object->as, 0, sizeof object->as);
     object->as.mesh.index = (uint32_t)scene->meshes.count;
     array_push(scene->meshes, mesh);
 }
