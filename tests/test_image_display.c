@@ -47,6 +47,9 @@ TEST(exposure)
             assert_int_equal(shown(value, &less), shown(value / 2, &none));
             assert_int_equal(shown(value, &part), shown(value * sqrtf(2), &none));
         }
+    const ImageHeader one = {.exposure = 1};
+    assert_int_equal(shown(NAN, &one), 0);
+    assert_int_equal(shown(FLT_MAX, &one), 255);
 }
 
 // Fills 8 by 8 pixels with a value and writes their display values.

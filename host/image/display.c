@@ -51,8 +51,10 @@ static void row_convert(uint8_t *bytes, const float *values, const ImageHeader *
     for (size_t start = 0, length; start < count; start += length) {
         length = count - start < CHUNK ? count - start : CHUNK;
         const float *chunk = values + start;
-        for (size_t i = 0; i < length && is_toned; i++)
-            toned[i] = (float)fmin(tone_apply(chunk[i] * gain, header->tone), FLT_MAX);
+        for (size_t i = 0; i < length && is_toned; i++) {
+            const double shown = tone_apply(chunk[i] * gain, header->tone);
+            toned[i] = shown > FLT_MAX ? FLT_MAX : (float)shown; // keeps NaN, unlike fmin()
+        }
         if (is_toned) chunk = toned;
         if (!header->dither) {
             transfer_quantize(bytes + start * value_size, chunk, length, header->transfer, header->bits);
