@@ -267,6 +267,17 @@ TEST(missing_materials_are_reported)
     scene_free(&scene);
 }
 
+TEST(the_last_material_of_a_name_is_used)
+{
+    file_write("a.mtl", "newmtl red\nKd 0.5 0 0\nnewmtl blue\nKd 0 0 1\nnewmtl red\nKd 1 0 0\nnewmtl re\n");
+    file_write("b.mtl", "newmtl reddish\nnewmtl blue\nKd 0 0 0.5\n");
+    OwnedScene scene = scene_of_obj("mtllib a.mtl b.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\n",
+                                    "a.mtl:5:8: warning: material 'red' is given twice: the last is used\n"
+                                    "b.mtl:2:8: warning: material 'blue' is given twice: the last is used\n");
+    assert_vector(triangle_material(&scene, 0)->color, 1, 0, 0);
+    assert_vector(triangle_material(&scene, 1)->color, 0, 0, 0.5);
+}
+
 TEST(images_of_materials_are_used)
 {
     file_write("a.ppm", "P3 1 1 255 255 0 0\n");

@@ -24,6 +24,8 @@ typedef struct {
 
 typedef struct {
     char *name;
+    size_t offset; // of the name in the file
+    size_t number; // of the material among those of all files
     Material material;
     MtlImage color_image, opacity_image, normal_image;
     uint32_t scene_index;   // DRAFT_NONE: not in the scene yet
@@ -92,6 +94,8 @@ static void material_start(MtlReader *reader)
 {
     const Word name = line_rest(&reader->line);
     MtlMaterial material = {.name = memory_copy_part(name.text, name.length),
+                            .offset = name.offset,
+                            .number = reader->materials.count,
                             .material = material_default(),
                             .scene_index = DRAFT_NONE,
                             .dissolve = {.value = NAN},
@@ -269,6 +273,46 @@ static void line_read(MtlReader *reader)
     unused_record(&reader->unused, &reader->report, word, "is not used");
 }
 
+// Orders materials of one name as their files do.
+static int materials_compare(const void *a, const void *b)
+{
+    const MtlMaterial *first = a, *second = b;
+    const int order = strcmp(first->name, second->name);
+    return order != 0 ? order : (first->number > second->number) - (first->number < second->number);
+}
+
+// Sorts the materials by name and warns of those of the current file whose name an earlier one has.
+static void materials_sort(MtlReader *reader)
+{
+    if (reader->materials.count == 0) return;
+    qsort(reader->materials.items, reader->materials.count, sizeof(MtlMaterial), materials_compare);
+    for (size_t i = 1; i < reader->materials.count; i++) {
+        const MtlMaterial *material = &reader->materials.items[i];
+        if (material->number >= reader->first_material && strcmp(material->name, material[-1].name) == 0)
+            report_warning(&reader->report, material->offset,
+                           "material '%.40s' is given twice: the last is used", material->name);
+    }
+}
+
+// Returns the last material of a name, or NULL if there is none.
+static MtlMaterial *material_named(const MtlReader *reader, Word name)
+{
+    size_t low = 0, high = reader->materials.count;
+    MtlMaterial *found = NULL;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        MtlMaterial *material = &reader->materials.items[middle];
+        const int order = strncmp(material->name, name.text, name.length);
+        const bool is_longer = order == 0 && material->name[name.length] != '\0';
+        if (order == 0 && !is_longer) found = material;
+        if (order > 0 || is_longer)
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return found;
+}
+
 // Reads an MTL file unless it was read before, under whatever name.
 static bool library_read(MtlReader *reader, const char *path)
 {
@@ -294,6 +338,7 @@ static bool library_read(MtlReader *reader, const char *path)
             while (line_next(&reader->line));
             MtlMaterial *last = material_of(reader);
             if (last) material_end(reader, last);
+            materials_sort(reader);
         }
         report_include(reader->draft->import->report, &reader->report);
     }
@@ -350,19 +395,6 @@ static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
     return true;
 }
 
-static int materials_compare(const void *a, const void *b)
-{
-    return strcmp(((const MtlMaterial *)a)->name, ((const MtlMaterial *)b)->name);
-}
-
-static int name_compare(const void *name, const void *material)
-{
-    const Word *word = name;
-    const MtlMaterial *other = material;
-    const int order = strncmp(word->text, other->name, word->length);
-    return order != 0 ? order : other->name[word->length] == '\0' ? 0 : -1;
-}
-
 // Adds an image to the scene. Returns 0 if there is none, or with a warning if it cannot be used.
 static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const MtlImage *image)
 {
@@ -415,18 +447,13 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
 {
     MtlReader reader = {.draft = draft};
     const bool all_read = libraries_read(&reader, materials);
-    if (reader.materials.count > 0)
-        qsort(reader.materials.items, reader.materials.count, sizeof(MtlMaterial), materials_compare);
     MtlMaterial otherwise = {.name = "", .material = material_default(), .scene_index = DRAFT_NONE};
     if (materials->used.count > 0 && materials->used.items[0].first_corner > 0)
         array_push(draft->materials, ((DraftMaterialRun){0, material_use(draft, &otherwise)}));
     UnusedWords unknown = {0};
     for (size_t i = 0; i < materials->used.count; i++) {
         const ObjMaterial *used = &materials->used.items[i];
-        MtlMaterial *material = reader.materials.count > 0
-                                    ? bsearch(&used->name, reader.materials.items, reader.materials.count,
-                                              sizeof(MtlMaterial), name_compare)
-                                    : NULL;
+        MtlMaterial *material = material_named(&reader, used->name);
         if (!material && all_read)
             unused_record(&unknown, &draft->report, used->name,
                           "is in no material file: the default is used");
