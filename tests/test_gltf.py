@@ -87,6 +87,12 @@ class Test(TestCase):
         gltf.square(mode=1)
         gltf.square()
         self.checked(gltf.write("a.gltf"), "meshes[0].primitives[0]: points and lines are not shown")
+        for mode, count in ((4, 8), (5, 2), (6, 1)):
+            gltf = Gltf()
+            gltf.square()
+            rows = [SQUARE[i] for i in TWO_TRIANGLES] + SQUARE
+            gltf.place(mesh=gltf.add("meshes", primitives=[{"attributes": {"POSITION": gltf.accessor(rows[:count])}, "mode": mode}]))
+            self.checked(gltf.write("a.gltf"), "meshes[1].primitives[0]: vertices that complete no triangle are not shown")
 
     def test_sparse(self):
         gltf = Gltf()

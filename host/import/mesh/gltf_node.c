@@ -131,12 +131,14 @@ static void triangle_add(MeshDraft *draft, const Vertices *vertices, size_t a, s
 
 enum { MODE_TRIANGLES = 4, MODE_STRIP, MODE_FAN };
 
-static void triangles_add(MeshDraft *draft, const Vertices *vertices, size_t mode)
+static void triangles_add(Gltf *gltf, const GltfItem *primitive, const Vertices *vertices, size_t mode)
 {
     const size_t count = vertices->indices.count > 0 ? vertices->indices.count : vertices->positions.count;
+    if (mode == MODE_TRIANGLES ? count % 3 > 0 : count == 1 || count == 2)
+        gltf_lose(gltf, primitive, "vertices that complete no triangle are not shown");
     for (size_t i = 0; i + 2 < count; i += mode == MODE_TRIANGLES ? 3 : 1) {
         const size_t odd = mode == MODE_STRIP ? i & 1 : 0;
-        triangle_add(draft, vertices, mode == MODE_FAN ? 0 : i, i + 1 + odd, i + 2 - odd);
+        triangle_add(gltf->draft, vertices, mode == MODE_FAN ? 0 : i, i + 1 + odd, i + 2 - odd);
     }
 }
 
@@ -170,7 +172,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     if (read) {
         vertices.is_mirrored = affine_determinant(affine) < 0;
         vertices_add(draft, &vertices, material, affine);
-        triangles_add(draft, &vertices, mode);
+        triangles_add(gltf, primitive, &vertices, mode);
     }
     vertices_free(&vertices);
     return read;
