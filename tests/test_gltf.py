@@ -385,6 +385,13 @@ class Test(TestCase):
         )
         self.assertEqual(report["lights"], 1)
 
+    def test_far_camera(self):
+        """A camera keeps its direction where a step of 1 is lost in rounding."""
+        gltf = Gltf()
+        gltf.square()
+        gltf.place(camera=gltf.add("cameras", type="perspective", perspective={"yfov": 1}), translation=[0, 0, 1e17])
+        self.checked(gltf.write("a.gltf"), "the mesh reaches 1e+17 from the eye")
+
     def test_parallel_rays(self):
         """From near and afar the square fills half of the frame's height and a quarter of its width."""
         for distance in 3, 4000:

@@ -75,10 +75,7 @@ bool dat_camera(DatReader *reader)
         reader->scene->camera.frame_aspect = (f[1] - f[0]) / height;
     }
     Camera *camera = &reader->scene->camera;
-    camera->position = block.center;
-    // far from the origin a step of 1 may be lost in rounding
-    const double step = fmax(1, vector_length(block.center));
-    camera->look_at = vector_add(block.center, vector_scale(vector_normalize(block.view), step));
+    camera_look_along(camera, block.center, vector_normalize(block.view));
     camera->up = block.up;
     camera->field_axis = FIELD_VERTICAL;
     camera->half_tangent = height / 2;

@@ -104,9 +104,9 @@ static bool read_ambient(RtReader *reader)
 static bool read_camera(RtReader *reader, Camera *camera)
 {
     Line *line = &reader->line;
-    Vector3 direction;
+    Vector3 position, direction;
     double fov_degrees;
-    if (!line_comma_vector(line, "position", NULL, &camera->position)) return false;
+    if (!line_comma_vector(line, "position", NULL, &position)) return false;
     size_t offset = line_peek(line).offset;
     if (!read_unit_vector(line, "direction", &direction) ||
         !line_number(line, "fov", &range_half_turn, &fov_degrees) || !element_end(reader))
@@ -115,9 +115,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
         report_warning(&reader->report, offset, "'direction' is zero; the camera looks along +z");
         direction = (Vector3){0, 0, 1};
     }
-    // Far from the origin a step of 1 may be lost in rounding.
-    double step = fmax(1, vector_length(camera->position));
-    camera->look_at = vector_add(camera->position, vector_scale(direction, step));
+    camera_look_along(camera, position, direction);
     camera->up = (Vector3){0, 1, 0};
     camera->field_axis = FIELD_HORIZONTAL;
     camera->half_tangent = portable_tangent(fov_degrees * (M_PI / 360));

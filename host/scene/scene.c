@@ -106,6 +106,13 @@ void scene_add_object(Scene *scene, Object object, const Material *material)
     array_push(scene->objects, object);
 }
 
+void camera_look_along(Camera *camera, Vector3 position, Vector3 direction)
+{
+    const double step = fmax(1, vector_length(position));
+    camera->position = position;
+    camera->look_at = vector_add(position, vector_scale(direction, step));
+}
+
 double camera_focal_distance(const Camera *camera)
 {
     if (camera->lens.radius == 0) return 0;

@@ -347,6 +347,9 @@ typedef struct {
 
 void scene_free(Scene *scene); // frees and zeroes
 
+// Sets the position, and look_at along a unit direction, far enough that rounding keeps the direction.
+void camera_look_along(Camera *camera, Vector3 position, Vector3 direction);
+
 // Returns the distance along the view that is in focus. Returns 0, which means that all distances are in
 // focus, if there is no lens or the point in focus lies behind it.
 double camera_focal_distance(const Camera *camera);

@@ -283,14 +283,12 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
             draft_warn(importer->draft, "only the first camera is used");
             continue;
         }
-        const Vector3 eye = affine_point(affine, vector_of(&camera->mPosition)),
-                      forward = vector_normalize(affine_direction(affine, vector_of(&camera->mLookAt)));
-        view->camera = (Camera){.position = eye,
-                                .look_at = vector_add(eye, forward),
-                                .up = affine_direction(affine, vector_of(&camera->mUp)),
+        view->camera = (Camera){.up = affine_direction(affine, vector_of(&camera->mUp)),
                                 .field_axis = FIELD_HORIZONTAL,
                                 .half_tangent = tan(camera->mHorizontalFOV / 2),
                                 .frame_aspect = fmax(camera->mAspect, 0)};
+        camera_look_along(&view->camera, affine_point(affine, vector_of(&camera->mPosition)),
+                          vector_normalize(affine_direction(affine, vector_of(&camera->mLookAt))));
         view->has_camera = true;
     }
     for (unsigned i = 0; i < file->mNumLights && view; i++) {

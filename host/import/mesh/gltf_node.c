@@ -197,14 +197,12 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
     if (is_sound && !(angle > 0 && angle < M_PI) && !(half_height > 0))
         gltf_fails(gltf, camera, "needs a 'yfov' between 0 and pi or a positive 'ymag'");
     else if (is_sound) {
-        const Vector3 eye = affine_point(affine, (Vector3){0, 0, 0}),
-                      forward = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1}));
-        view->camera = (Camera){.position = eye,
-                                .look_at = vector_add(eye, forward),
-                                .up = affine_direction(affine, (Vector3){0, 1, 0}),
+        view->camera = (Camera){.up = affine_direction(affine, (Vector3){0, 1, 0}),
                                 .field_axis = FIELD_VERTICAL,
                                 .half_tangent = tan(angle / 2),
                                 .frame_aspect = fmax(aspect, 0)};
+        camera_look_along(&view->camera, affine_point(affine, (Vector3){0, 0, 0}),
+                          vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})));
         if (flat.json) {
             view->camera.projection = PROJECTION_ORTHOGRAPHIC;
             view->camera.half_tangent = half_height;
