@@ -2,6 +2,7 @@
 # Checks that includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then
 # image; opencl}, base. A room includes itself and the rooms below it. Only compile, render and opencl include the kernels'
 # shared headers, each its set, only opencl and render include OpenCL's, only view those of the window, and only mpi MPI's.
+# Checks also that the rooms that make a scene's flat arrays call none of libm's functions that differ between processors.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -91,7 +92,22 @@ expect forbidden host/render/renderer.c '#include "host/api/glint.h"'
 expect forbidden host/extra/thing.c '#include "host/base/text.h"'
 expect forbidden kernels/types.h '#include "host/base/text.h"'
 
-found=$(forbidden_includes .)
+# Prints each call of a function in place of which host/scene/portable.h has one.
+unportable_calls() {
+    sed 's|//.*||' "$1" | grep -nE '(^|[^_[:alnum:]])(a?(sin|cos|tan)|atan2|exp2?|log2?|pow|cbrt|hypot)\(' | sed "s|^|$1:|"
+}
+
+echo 'a = sin(b); // pow(c, d)' >"$scratch/call.c"
+echo 'a = portable_sine(b); // pow(c, d)' >"$scratch/none.c"
+if [ -z "$(unportable_calls "$scratch/call.c")" ] || [ -n "$(unportable_calls "$scratch/none.c")" ]; then
+    echo "unportable_calls misses a call or finds one where there is none"
+    failed=1
+fi
+
+found=$(
+    forbidden_includes .
+    find host/scene host/import host/compile -name '*.[ch]' | while read -r file; do unportable_calls "$file"; done
+)
 if [ -n "$found" ]; then
     echo "$found"
     failed=1

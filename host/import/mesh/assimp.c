@@ -9,6 +9,7 @@
 #include "host/import/number.h"
 #include "host/scene/affine.h"
 #include "host/scene/polygon.h"
+#include "host/scene/portable.h"
 
 #include <assimp/cimport.h>
 #include <assimp/scene.h>
@@ -285,7 +286,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         }
         view->camera = (Camera){.up = affine_direction(affine, vector_of(&camera->mUp)),
                                 .field_axis = FIELD_HORIZONTAL,
-                                .half_tangent = tan(camera->mHorizontalFOV / 2),
+                                .half_tangent = portable_tangent(camera->mHorizontalFOV / 2),
                                 .frame_aspect = fmax(camera->mAspect, 0)};
         camera_look_along(&view->camera, affine_point(affine, vector_of(&camera->mPosition)),
                           vector_normalize(affine_direction(affine, vector_of(&camera->mLookAt))));

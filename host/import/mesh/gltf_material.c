@@ -3,6 +3,7 @@
 #include "host/base/memory.h"
 #include "host/import/mesh/gltf.h"
 #include "host/import/number.h"
+#include "host/scene/portable.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -141,7 +142,7 @@ static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *pla
         !gltf_numbers(gltf, &transform, "rotation", 1, &angle))
         return;
     gltf_integer(gltf, &transform, "texCoord", 0, UV_SETS_MAX, &place->uv_set);
-    const double c = cos(angle), s = sin(angle);
+    const double c = portable_cosine(angle), s = portable_sine(angle);
     const double rows[2][3] = {{c * scale[0], s * scale[1], offset[0]},
                                {-s * scale[0], c * scale[1], offset[1]}};
     memcpy(place->uv_rows, rows, sizeof rows);

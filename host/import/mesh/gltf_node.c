@@ -3,6 +3,7 @@
 #include "host/import/mesh/gltf.h"
 #include "host/import/number.h"
 #include "host/scene/polygon.h"
+#include "host/scene/portable.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -199,7 +200,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
     else if (is_sound) {
         view->camera = (Camera){.up = affine_direction(affine, (Vector3){0, 1, 0}),
                                 .field_axis = FIELD_VERTICAL,
-                                .half_tangent = tan(angle / 2),
+                                .half_tangent = portable_tangent(angle / 2),
                                 .frame_aspect = fmax(aspect, 0)};
         camera_look_along(&view->camera, affine_point(affine, (Vector3){0, 0, 0}),
                           vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})));
