@@ -322,6 +322,21 @@ TEST(copies_are_limited)
     report_close(&report);
 }
 
+TEST(mesh_of_one_point_has_a_camera)
+{
+    static const char *const points[] = {"0 0 0", "3 -4 1e20"};
+    for (size_t i = 0; i < COUNT_OF(points); i++) {
+        file_write("a.obj", formatted("v %s\nf 1 1 1\n", points[i]));
+        const SceneOptions options = {0};
+        OwnedMessageList messages = {0};
+        OwnedScene scene;
+        assert_true(scene_load(&scene, "a.obj", &options, &messages));
+        assert_false(vectors_equal(scene.camera.position, scene.camera.look_at));
+        for (size_t k = 0; k < scene.lights.count; k++)
+            assert_false(vector_is_zero(scene.lights.items[k].direction));
+    }
+}
+
 TEST(device_without_room_is_reported)
 {
     file_write("a.obj", octahedron);

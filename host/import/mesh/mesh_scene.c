@@ -33,6 +33,7 @@ static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
             fmax(fabs(vector_dot(from_center, right)), fabs(vector_dot(from_center, above)));
         distance = fmax(distance, vector_dot(from_center, toward) + off_axis / (filled * half_tangent));
     }
+    if (distance == 0) distance = fmax(1, vector_length(center));
     return (Camera){.position = vector_add(center, vector_scale(toward, distance)),
                     .look_at = center,
                     .up = up,
