@@ -2,6 +2,7 @@
 // and what the process that runs assimp may do.
 #include "host/base/base64.h"
 #include "host/compile/scene_bounds.h"
+#include "host/import/mesh/assimp_process.h"
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
@@ -272,6 +273,51 @@ TEST(child_is_limited)
     }
     signal(SIGXCPU, on_processor);
     signal(SIGALRM, on_alarm);
+}
+
+// Sends a view and warnings as a process that reads a mesh does. Sets *view to the view that arrives.
+static void reply_pass(MeshView *sent, size_t warning_count, MeshView *view, MessageList *messages)
+{
+    const Source source = {.file = "a.fbx", .bytes = ""};
+    OwnedMessageList sent_messages = {0};
+    FILE *reply = tmpfile();
+    assert_non_null(reply);
+    for (int side = 0; side < 2; side++) {
+        Report report = report_open(&source, side == 0 ? &sent_messages : messages);
+        OwnedScene scene = {0};
+        const MeshImport import = {.path = source.file,
+                                   .view = side == 0 ? sent : view,
+                                   .report = &report,
+                                   .offset = MESSAGE_WHOLE_FILE};
+        MeshDraft draft = {.import = &import, .scene = &scene, .source = source, .places = DRAFT_NO_PLACES};
+        bool is_read = true;
+        for (size_t i = 0; side == 0 && i < warning_count; i++)
+            draft_warn(&draft, "fault %zu", i);
+        if (side == 0)
+            assimp_reply_write(&draft, reply, is_read);
+        else
+            assert_true(assimp_reply_read(&draft, reply, &is_read) && is_read && report_close(&report));
+        rewind(reply);
+    }
+    fclose(reply);
+}
+
+// A hostile file may control the process that sends the reply.
+TEST(a_reply_sets_only_what_assimp_read_sets)
+{
+    Light light = {.type = LIGHT_POINT, .area = {.type = AREA_SPHERE, .is_visible = true, .radius = NAN}};
+    MeshView sent = {.camera = {.half_tangent = 1, .shift = {NAN, 1}, .lens.radius = 1},
+                     .has_camera = true,
+                     .lights = {&light, 1, 1}},
+             view = {.has_camera = false};
+    OwnedMessageList messages = {0};
+    reply_pass(&sent, 0, &view, &messages);
+    assert_true(view.has_camera && view.lights.count == 1);
+    assert_true(view.camera.half_tangent == 1);
+    assert_true(view.camera.shift[0] == 0 && view.camera.shift[1] == 0 && view.camera.lens.radius == 0);
+    assert_int_equal(view.lights.items[0].area.type, AREA_NONE);
+    assert_true(view.lights.items[0].area.radius == 0);
+    free(view.lights.items);
 }
 
 TEST_MAIN(formats_open, formats_close)

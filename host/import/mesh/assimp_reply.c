@@ -232,16 +232,24 @@ static bool materials_add(MeshDraft *draft, const ReplyLists *lists, const uint3
     return true;
 }
 
-// Adds the camera and the lights, whose values mesh_scene.c checks.
+// Copies the members of the camera and the lights that assimp_read sets, whose values mesh_scene.c checks.
 static bool view_add(MeshDraft *draft, const ReplyLists *lists, const ReplyHeader *header)
 {
     MeshView *view = draft->import->view;
     if (!view) return lists->lights.count == 0 && !header->has_camera;
     for (size_t i = 0; i < lists->lights.count; i++)
         array_push(view->lights, lists->lights.items[i]);
+    for (size_t i = 0; i < view->lights.count; i++)
+        memset(&view->lights.items[i].area, 0, sizeof view->lights.items[i].area);
     if (header->has_camera) {
+        const Camera *from = &header->camera;
         view->has_camera = true;
-        view->camera = header->camera;
+        view->camera = (Camera){.position = from->position,
+                                .look_at = from->look_at,
+                                .up = from->up,
+                                .field_axis = from->field_axis,
+                                .half_tangent = from->half_tangent,
+                                .frame_aspect = from->frame_aspect};
     }
     return true;
 }
