@@ -320,4 +320,13 @@ TEST(a_reply_sets_only_what_assimp_read_sets)
     free(view.lights.items);
 }
 
+TEST(a_reply_counts_the_warnings_beyond_the_limit)
+{
+    MeshView view = {.has_camera = false};
+    OwnedMessageList messages = {0};
+    reply_pass(&view, 25, &view, &messages);
+    assert_int_equal(messages.count, 21);
+    assert_string_equal(messages.items[20].text, "a.fbx: 5 more warnings");
+}
+
 TEST_MAIN(formats_open, formats_close)

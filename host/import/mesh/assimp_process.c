@@ -59,7 +59,6 @@ int assimp_process_main(int argument_count, char **arguments)
                                .offset = MESSAGE_WHOLE_FILE};
     MeshDraft draft = {.import = &import, .scene = &scene, .source = source, .places = DRAFT_NO_PLACES};
     const bool is_read = assimp_read(&draft);
-    report_close(&report);
     assimp_reply_write(&draft, reply, is_read);
     // assimp's destructors are not needed
     _exit(fflush(reply) == 0 ? EXIT_SUCCESS : EXIT_FAILURE);

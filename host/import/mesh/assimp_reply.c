@@ -41,6 +41,7 @@ enum { LIST_COUNT = 5, ARRAY_COUNT = LIST_COUNT + 6 };
 typedef struct {
     char magic[8];
     uint64_t is_read, has_normals, has_uvs, has_camera;
+    uint64_t warning_count; // including those beyond the limit, which are not sent
     Camera camera;
     uint64_t counts[ARRAY_COUNT];
 } ReplyHeader;
@@ -113,7 +114,8 @@ void assimp_reply_write(MeshDraft *draft, FILE *reply, bool is_read)
 {
     ReplyHeader header = {.is_read = is_read,
                           .has_normals = draft->is_shared[DRAFT_NORMAL],
-                          .has_uvs = draft->is_shared[DRAFT_UV]};
+                          .has_uvs = draft->is_shared[DRAFT_UV],
+                          .warning_count = draft->import->report->warning_count};
     ReplyLists lists = lists_of(draft);
     const ReplyArrays arrays = arrays_of(draft, &lists);
     const MeshView *view = draft->import->view;
@@ -162,16 +164,21 @@ static bool reply_read(MeshDraft *draft, FILE *reply, ReplyHeader *header, Reply
            memcmp(end, magic, sizeof magic) == 0;
 }
 
-static void messages_add(MeshDraft *draft, const ReplyLists *lists)
+static void messages_add(MeshDraft *draft, const ReplyLists *lists, uint64_t warning_count)
 {
+    Report *report = draft->import->report;
+    size_t received_count = 0;
     for (size_t i = 0; i < lists->messages.count; i++) {
         ReplyMessage *message = &lists->messages.items[i];
         message->text[sizeof message->text - 1] = '\0';
+        received_count += !message->is_error;
         if (message->is_error)
             draft_refuse(draft, "%s", message->text);
         else
             draft_warn(draft, "%s", message->text);
     }
+    if (warning_count > received_count && !report_repeats(report, draft->import->path, 0, 0, ""))
+        report->warning_count += (size_t)warning_count - received_count;
 }
 
 // Sets `textures` to the scene's index of each texture. Returns false if their bytes are not those of the
@@ -306,7 +313,7 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
     ReplyLists lists = {0};
     uint32_t textures[SCENE_TEXTURES_MAX];
     bool is_sound = reply_read(draft, reply, &header, &lists);
-    if (is_sound) messages_add(draft, &lists);
+    if (is_sound) messages_add(draft, &lists, header.warning_count);
     is_sound = is_sound && textures_add(draft, &lists, textures) && materials_add(draft, &lists, textures) &&
                view_add(draft, &lists, &header) && draft_is_sound(draft, &header, lists.materials.count);
     lists_free(&lists);
