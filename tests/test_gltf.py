@@ -159,6 +159,7 @@ class Test(TestCase):
             (("buffers", 0, "uri"), "data:;base64,%%", r"buffers\[0\].uri: is not base64"),
             (("buffers", 0, "uri"), "https://example.org/a", r"buffers\[0\].uri: must be a relative path"),
             (("buffers", 0, "uri"), "none.bin", r"buffers\[0\].uri: cannot read 'none.bin': No such file"),
+            (("buffers", 0, "uri"), "unreadable.bin", r"buffers\[0\].uri: cannot read 'unreadable.bin': Input/output error"),
             (("bufferViews",), [], r"bufferView: the file has no 'bufferViews'"),
             (("nodes",), {}, "nodes: must be an array"),
             (("scenes", 0, "nodes"), {}, r"scenes\[0\].nodes: must be an array"),
@@ -169,6 +170,7 @@ class Test(TestCase):
             ((*accessor, "normalized"), 1, r"accessors\[0\].normalized: must be true or false"),
             (("extensionsRequired",), "KHR_draco_mesh_compression", "extensionsRequired: must be an array"),
         )
+        Path("unreadable.bin").symlink_to("/proc/self/mem")
         for path, value, message in faults:
             gltf = Gltf()
             gltf.square()

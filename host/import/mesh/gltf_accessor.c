@@ -77,19 +77,20 @@ static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri
     scene_file_named(gltf->draft->import->options, path);
     const char *obstacle = file_obstacle(path);
     MessageList problems = {0};
-    if (!obstacle) {
+    bool read = !obstacle;
+    if (read) {
         const FileId file = file_id(path);
         for (size_t i = 0; i < gltf->buffer_count; i++)
             if (gltf->buffers[i].bytes && file_is_same(gltf->buffers[i].file, file))
                 *buffer = (GltfBuffer){.bytes = gltf->buffers[i].bytes, .length = gltf->buffers[i].length};
-        if (!buffer->bytes && !text_read_file(&buffer->owned, path, &problems))
-            obstacle = problems.items[0].text;
+        read = buffer->bytes || text_read_file(&buffer->owned, path, &problems);
         buffer->file = file;
     }
     if (obstacle) gltf_fails(gltf, uri, "cannot read '%.100s': %s", path, obstacle);
+    if (problems.count > 0) gltf_fails(gltf, uri, "%s", problems.items[0].text);
     message_list_free(&problems);
     free(path);
-    return !obstacle;
+    return read;
 }
 
 static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bool is_first)
