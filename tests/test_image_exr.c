@@ -248,6 +248,7 @@ TEST(parts_are_layers)
     exr_close(exr_open(parts, 3, plain), 3, plain);
     check_values("other", "\x3e\x3d\x3c", "a part's name");
     check_values("a", "\x3f\x40\x41", "a layer of a part");
+    check_values("depth", "0", "the first part's name");
     check_refused(NULL, "several layers, beauty, other; name one");
 }
 

@@ -1,6 +1,6 @@
 // Finds layers by OpenEXR's "Technical Introduction" (2013), "Naming conventions". A channel's name is its
 // layer's name, a dot and a base name. In a file of several parts, a part's name is the layer of its
-// channels that have none.
+// channels that have none. Those of the first part are also the default layer.
 #include "host/image/exr_layers.h"
 
 #include "host/base/array.h"
@@ -162,15 +162,23 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
     return false;
 }
 
+static bool candidate_has_name(exr_const_context_t context, const Candidate *candidate, const char *name)
+{
+    if (candidate->length == strlen(name) && memcmp(candidate->name, name, candidate->length) == 0)
+        return true;
+    const char *part_name = NULL;
+    return candidate->length == 0 && exr_get_name(context, candidate->part, &part_name) == EXR_ERR_SUCCESS &&
+           part_name && strcmp(part_name, name) == 0;
+}
+
 static bool named_layer_find(exr_const_context_t context, const CandidateList *list, const ImageFile *file,
                              ExrLayer *layer)
 {
     const char *name = file->options.layer;
-    const size_t length = strlen(name);
     char problem[128];
     for (size_t i = 0; i < list->count; i++) {
         const Candidate *candidate = &list->items[i];
-        if (candidate->length != length || memcmp(candidate->name, name, length) != 0) continue;
+        if (!candidate_has_name(context, candidate, name)) continue;
         *layer = layer_of(candidate);
         if (layer->form != EXR_OTHER) return true;
         snprintf(problem, sizeof problem,
