@@ -233,7 +233,10 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
 {
     static const char described[] = "options x\nlaunch render 8x1\ndevice y, z\n";
     MessageList messages = {0};
+    OwnedMessageList earlier = {0};
+    message_warning(&earlier, "earlier");
     CacheEntries entries;
+    assert_true(cache_list(&entries, &earlier) && cache_clear(&earlier)); // without a folder
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 0);
     store(key);

@@ -428,8 +428,9 @@ static void entry_describe(CacheEntry *entry, int folder)
 bool cache_list(CacheEntries *entries, MessageList *messages)
 {
     *entries = (CacheEntries){0};
+    const size_t earlier_count = messages->count;
     int folder = folder_open(false, messages);
-    if (folder < 0) return messages->count == 0;
+    if (folder < 0) return messages->count == earlier_count;
     const bool is_listed = entries_list(entries, folder, messages);
     for (size_t i = 0; i < entries->count; i++)
         entry_describe(&entries->items[i], folder);
@@ -439,8 +440,9 @@ bool cache_list(CacheEntries *entries, MessageList *messages)
 
 bool cache_clear(MessageList *messages)
 {
+    const size_t earlier_count = messages->count;
     int folder = folder_open(false, messages);
-    if (folder < 0) return messages->count == 0;
+    if (folder < 0) return messages->count == earlier_count;
     folder_lock(folder);
     bool is_cleared = folder_trim(folder, 0, messages);
     is_cleared &= file_remove(folder, secret_name, messages);
