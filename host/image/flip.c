@@ -303,23 +303,25 @@ static double compressed(double distance, double largest)
     return compressed_to + (distance - knee) / (largest - knee) * (1 - compressed_to);
 }
 
-// Returns the difference of two perceived colors (section 4.1.3).
-static double color_difference(Tristimulus reference, Tristimulus test)
+// Returns the largest distance of two perceived colors, that of green and blue (section 4.1.3).
+static double largest_distance(void)
 {
-    double largest = color_distance(hunt_lab((Tristimulus){0, 1, 0}), hunt_lab((Tristimulus){0, 0, 1}));
-    return compressed(color_distance(reference, test), largest);
+    return color_distance(hunt_lab((Tristimulus){0, 1, 0}), hunt_lab((Tristimulus){0, 0, 1}));
 }
 
 double flip_of_colors(const float reference[3], const float test[3])
 {
-    return color_difference(seen_color(ycc_from_display(reference)), seen_color(ycc_from_display(test)));
+    return compressed(
+        color_distance(seen_color(ycc_from_display(reference)), seen_color(ycc_from_display(test))),
+        largest_distance());
 }
 
 void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map)
 {
     Seen seen = seen_open(reference, width, height), other = seen_open(test, width, height);
+    const double largest = largest_distance();
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        double color = color_difference(seen_color_at(&seen, i), seen_color_at(&other, i));
+        double color = compressed(color_distance(seen_color_at(&seen, i), seen_color_at(&other, i)), largest);
         double edge = fabs((double)seen.edges.values[i] - (double)other.edges.values[i]);
         double point = fabs((double)seen.points.values[i] - (double)other.points.values[i]);
         double feature = pow(fmax(edge, point) / sqrt(2), feature_exponent);
