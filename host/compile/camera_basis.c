@@ -28,5 +28,5 @@ CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
 // (docs/numerics.md).
 double camera_direction_error(const CameraBasis *basis)
 {
-    return vector_is_zero(basis->shift) ? 7 : 6 * (1 + vector_length(basis->middle));
+    return vector_is_zero(basis->shift) ? 7 : CAMERA_SHIFT_ERROR * (1 + vector_length(basis->middle));
 }

@@ -121,8 +121,8 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         return message_error(
             messages,
             "'shift' moves the middle of the frame to %.3g focal lengths from the eye, where "
-            "certified has error bounds up to 4.33: choose another precision",
-            vector_length(basis.middle));
+            "certified has error bounds up to %.3g: choose another precision",
+            vector_length(basis.middle), (double)CAMERA_DIRECTION_ERROR_MAX / CAMERA_SHIFT_ERROR - 1);
     if (settings->certifies && materials_union(scene, material_shadow))
         return message_error(messages, "a material has 'shadow: false', which has no error bound: choose a "
                                        "precision other than certified");
