@@ -27,11 +27,12 @@ static double smallest_size(const Scene *scene)
 // is that of the scene as it is.
 double scene_unit(const Scene *scene, const CompileSettings *settings)
 {
+    if (settings->precision == PRECISION_DOUBLE) return 1;
     const int harmless = 30; // exponents up to there
     Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
     size_t unbounded_count;
     Bounds bounds = scene_bounds(scene, &unbounded_count);
-    if (settings->precision == PRECISION_DOUBLE || bounds_is_empty(&bounds)) return 1;
+    if (bounds_is_empty(&bounds)) return 1;
     int farthest, smallest;
     frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
     if (abs(farthest) <= harmless) return 1;
