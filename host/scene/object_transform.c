@@ -79,7 +79,10 @@ static bool keeps_type(const Object *object, const ShapeMembers *members, const 
 // its type. Leaves numbers that object_transform checks.
 static bool shape_transform(Object *object, const Affine *affine)
 {
-    if (object->type == SHAPE_OVAL) return oval_transform(object, affine);
+    if (object->type == SHAPE_OVAL) {
+        oval_transform(object, affine);
+        return true;
+    }
     const ShapeMembers members = shape_members(object);
     if (object->type == SHAPE_TRIANGLE) {
         affine_triangle(affine, object->as.triangle.vertices, object->as.triangle.normals);

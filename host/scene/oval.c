@@ -105,7 +105,7 @@ static void axis_rescale(Object *object)
     object->as.oval.rise *= factor;
 }
 
-bool oval_transform(Object *object, const Affine *affine)
+void oval_transform(Object *object, const Affine *affine)
 {
     Vector3 *axes = object->as.oval.axes;
     object->as.oval.center = affine_point(affine, object->as.oval.center);
@@ -113,12 +113,11 @@ bool oval_transform(Object *object, const Affine *affine)
         axes[i] = affine_direction(affine, axes[i]);
     if (object->as.oval.unit == SHAPE_SPHERE) {
         axes_turn_all(axes);
-        return true;
+        return;
     }
     axes_turn(&axes[0], &axes[1]);
     if (object->as.oval.unit == SHAPE_DISC) axes[2] = vector_cross(vector_normalize(axes[0]), axes[1]);
     if (object->as.oval.unit != SHAPE_TORUS) axis_rescale(object);
-    return true;
 }
 
 void oval_stretches(const Object *oval, double *least, double *most)

@@ -7,9 +7,8 @@
 // Converts a sphere, disc, cylinder, cone, torus or paraboloid to an oval with the same points.
 void oval_make(Object *object);
 
-// Transforms an oval. Among the maps that give the same points it chooses one that stretches little. Returns
-// true.
-bool oval_transform(Object *object, const Affine *affine);
+// Transforms an oval. Among the maps that give the same points it chooses one that stretches little.
+void oval_transform(Object *object, const Affine *affine);
 
 // Returns whether the axes' lengths and directions are moderate enough for a mapped ray to stay accurate.
 bool oval_is_moderate(const Object *object);
