@@ -52,8 +52,7 @@ static inline Vector3 axis_scaled(Vector3 axis)
     const double largest = vector_largest(axis);
     if (!(largest > 0x1p-1000 && largest < 0x1p1000)) { // the power of two may not be a double
         int exponent;
-        frexp(largest, &exponent);
-        return (Vector3){ldexp(axis.x, -exponent), ldexp(axis.y, -exponent), ldexp(axis.z, -exponent)};
+        return vector_scaled_down(axis, &exponent);
     }
     uint64_t bits;
     memcpy(&bits, &largest, sizeof bits);

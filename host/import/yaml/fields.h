@@ -118,6 +118,8 @@ _Static_assert(offsetof(MaterialName, name) == 0 && offsetof(Definition, name) =
 // Bounds the cost of a wrong name in a hostile file.
 enum { NAMES_COMPARED_MAX = 1000 };
 
+// Initializes a list of fields and its count.
+#define FIELDS(fields)  fields, COUNT_OF(fields)
 #define NAMES_OF(array) ((Names){(array), COUNT_OF(array), sizeof *(array)})
 
 // Returns the index of a name, or the count if it is unknown.

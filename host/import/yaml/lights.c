@@ -139,7 +139,6 @@ static void area_set(LightFields *read)
     }
 }
 
-#define FIELDS(fields) fields, COUNT_OF(fields)
 static const struct {
     const char *name;
     LightType type;

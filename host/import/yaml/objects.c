@@ -172,8 +172,6 @@ typedef struct {
     bool takes_texture; // whether its material may have a texture
 } Shape;
 
-#define FIELDS(fields) fields, COUNT_OF(fields)
-
 // The shapes by ShapeType, except meshes, which have a separate reader.
 static const Shape shapes[SHAPE_OVAL] = {
     {{.type = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
