@@ -69,7 +69,7 @@ double exact_rounded(bool is_double, Exact exact, RoundingMode rounding)
 }
 
 // Returns the ulp of a normal double.
-static double ulp_of(bool is_double, double value)
+static double normal_ulp(bool is_double, double value)
 {
     const uint64_t exponent_bits = UINT64_C(0x7ff0000000000000);
     return real_value(true, real_bits(true, value) & exponent_bits) * (is_double ? 0x1p-52 : 0x1p-23);
@@ -86,7 +86,7 @@ double quotient_error(bool is_double, double a, double b, double quotient)
     const double exact = a / b;
     if (!is_double && (float)exact == (float)quotient) return 0.5;
     if (!(quotient > 0) || isinf(quotient)) return INFINITY;
-    const double ulp = ulp_of(is_double, quotient);
+    const double ulp = normal_ulp(is_double, quotient);
     if (!is_double) return error_of(fabs(exact - quotient) / ulp, false);
     // exact for a quotient within an ulp; so is b times a power of two
     const double residual = fabs(fma(-quotient, b, a)), half = 0.5 * ulp * b;
@@ -98,7 +98,7 @@ double root_error(bool is_double, double a, double root)
     const double exact = sqrt(a);
     if (!is_double && (float)exact == (float)root) return 0.5;
     if (!(root > 0) || isinf(root)) return INFINITY;
-    const double ulp = ulp_of(is_double, root);
+    const double ulp = normal_ulp(is_double, root);
     if (!is_double) return error_of(fabs(exact - root) / ulp, false);
     // (root - ulp / 2)^2 < a < (root + ulp / 2)^2: a - root^2 is a multiple of ulp^2, so that ulp^2 / 4
     // counts only in the first
