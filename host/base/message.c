@@ -186,7 +186,8 @@ static bool texts_are_alike(const char *a, const char *b)
             continue;
         }
         char *a_end, *b_end;
-        const double a_value = strtod(a, &a_end), b_value = strtod(b, &b_end);
+        const double a_value = strtod_l(a, &a_end, text_locale()),
+                     b_value = strtod_l(b, &b_end, text_locale());
         const size_t a_digits = strspn(a, "0123456789"), b_digits = strspn(b, "0123456789");
         if (a + a_digits == a_end && b + b_digits == b_end && a_value != b_value) return false;
         a = a_end;
