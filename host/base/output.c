@@ -183,7 +183,8 @@ enum { MODE_NEW = 0666, MODE_PRIVATE = 0600, MODE_BITS = 0777 };
 
 // Creates `output->name` in `output->folder`. The umask applies to the mode `created`, but not to `exact`,
 // which may be NULL.
-static bool output_open_beside(OutputFile *output, mode_t created, const mode_t *exact, MessageList *messages)
+static bool output_create_next_to(OutputFile *output, mode_t created, const mode_t *exact,
+                                  MessageList *messages)
 {
     int descriptor = unnamed_open(output, created);
     if (descriptor < 0) descriptor = named_open(output, created);
@@ -218,7 +219,7 @@ bool output_open_private(OutputFile *output, int folder, const char *name, Messa
     output->has_folder = output->folder >= 0;
     if (!output->has_folder) return output_failed(output, "create", messages);
     static const mode_t exact = MODE_PRIVATE;
-    return output_open_beside(output, MODE_PRIVATE, &exact, messages);
+    return output_create_next_to(output, MODE_PRIVATE, &exact, messages);
 }
 
 // Returns the end of a chain of symbolic links, even if no file exists there, or `target` if not a link.
@@ -260,8 +261,8 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
     if (!folder_open(output)) return output_failed(output, "create", messages);
     old.st_mode &= MODE_BITS;
-    return output_open_beside(output, exists ? MODE_PRIVATE : MODE_NEW, exists ? &old.st_mode : NULL,
-                              messages);
+    return output_create_next_to(output, exists ? MODE_PRIVATE : MODE_NEW, exists ? &old.st_mode : NULL,
+                                 messages);
 }
 
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)

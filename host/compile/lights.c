@@ -3,7 +3,7 @@
 
 _Static_assert((int)LIGHT_POINT == LIGHT_TYPE_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_TYPE_DIRECTIONAL &&
                    (int)LIGHT_SPOT == LIGHT_TYPE_SPOT,
-               "kinds of lights have the kernels' numbers");
+               "types of lights have the kernels' numbers");
 _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT_AREA_RECTANGLE &&
                    (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE &&
                    (int)AREA_TRIANGLE == LIGHT_AREA_TRIANGLE && (int)AREA_SKY == LIGHT_AREA_SKY,

@@ -9,7 +9,7 @@ extern const ShapeOps mesh_ops;
 #define SHAPE_ROW(feature, Type, name, names) [TYPE_##feature] = &name##_ops,
 const ShapeOps *const shape_ops[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)[SHAPE_MESH] = &mesh_ops};
 _Static_assert((int)SHAPE_MESH == (int)TYPE_INSTANCES && TYPE_INSTANCES + 1 == TYPE_COUNT,
-               "ShapeKind follows PRIMITIVE_LIST: a mesh, which is last, may be an instance");
+               "ShapeType follows PRIMITIVE_LIST, whose last type is that of meshes and instances");
 
 Bounds object_bounds(const Scene *scene, const Object *object)
 {

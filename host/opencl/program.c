@@ -201,8 +201,8 @@ static void build_log_keep(const Compute *compute, const Build *build, const cha
     text_free(&entry);
 }
 
-// Builds `text`. If `afresh` is set, bypasses the driver's cache.
-static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request, bool afresh)
+static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request,
+                               bool bypasses_driver_cache)
 {
     Build build = {0};
     cl_int status;
@@ -211,7 +211,7 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
     Text options = {0};
     program_options_append(&options, compute->device, request->options);
-    if (afresh) unused_option_append(&options);
+    if (bypasses_driver_cache) unused_option_append(&options);
     // before the build, which may crash
     if (compute->device->kernel_folder) kernel_file_write(compute->device, text, "cl", "wx", text);
     const double start = clock_seconds();

@@ -4,12 +4,12 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 
-typedef enum { PLY_SIGNED, PLY_UNSIGNED, PLY_REAL } PlyNumberKind;
+typedef enum { PLY_SIGNED, PLY_UNSIGNED, PLY_REAL } PlyNumberType;
 
 typedef struct {
     const char *name;
     size_t size; // in a binary file
-    PlyNumberKind kind;
+    PlyNumberType number_type;
 } PlyType;
 
 typedef struct {

@@ -124,11 +124,11 @@ static bool value_missing(PlyReader *reader, const PlyProperty *property)
 }
 
 // Reads a whole number of 32 bits.
-static bool whole_read(const char **text, const char *end, PlyNumberKind kind, double *value)
+static bool whole_read(const char **text, const char *end, PlyNumberType type, double *value)
 {
     const char *at = *text;
-    const bool is_negative = kind == PLY_SIGNED && at < end && *at == '-';
-    if (kind == PLY_SIGNED && at < end && (*at == '-' || *at == '+')) at++;
+    const bool is_negative = type == PLY_SIGNED && at < end && *at == '-';
+    if (type == PLY_SIGNED && at < end && (*at == '-' || *at == '+')) at++;
     const char *first = at;
     uint64_t number = 0;
     for (; at < end && (unsigned char)(*at - '0') < 10 && number <= UINT32_MAX; at++)
@@ -163,8 +163,8 @@ static bool word_read(PlyReader *reader, const PlyType *type, double *value, boo
     *is_there = line_has_word(&reader->line);
     if (!*is_there) return true;
     const char *at = reader->line.at, *end = reader->line.end;
-    const bool read =
-        type->kind == PLY_REAL ? real_read(&at, end, value) : whole_read(&at, end, type->kind, value);
+    const bool read = type->number_type == PLY_REAL ? real_read(&at, end, value)
+                                                    : whole_read(&at, end, type->number_type, value);
     if (read && word_ends_at(&reader->line, at)) {
         reader->line.at = at;
         return true;
@@ -185,8 +185,8 @@ static double binary_number(const PlyReader *reader, const PlyType *type)
     uint64_t bits = 0, end = 1; // of whole numbers' bits
     for (size_t i = 0; i < type->size; i++, end <<= 8)
         bits = bits << 8 | bytes[reader->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
-    if (type->kind == PLY_UNSIGNED) return (double)bits;
-    if (type->kind == PLY_SIGNED) return (double)bits - (bits >= end / 2 ? (double)end : 0);
+    if (type->number_type == PLY_UNSIGNED) return (double)bits;
+    if (type->number_type == PLY_SIGNED) return (double)bits - (bits >= end / 2 ? (double)end : 0);
     double number;
     float single;
     uint32_t single_bits = (uint32_t)bits;
