@@ -5,6 +5,6 @@
 #include <stdint.h>
 
 void base64_append(Text *text, const uint8_t *bytes, size_t count);
-// Decodes base64 text and appends its bytes. The padding at the end may be missing. Returns false if other
-// characters occur.
+// Decodes base64 text and appends its bytes. Any padding at the end is skipped, and may be missing. Returns
+// false if other characters occur, or if a last character remains that makes no byte.
 bool base64_decode(Text *bytes, const char *text, size_t length);

@@ -12,10 +12,10 @@
 
 struct Stage {
     atomic_size_t done;
-    pthread_mutex_t mutex; // of the rest
-    Text name;             // empty: no operation
+    pthread_mutex_t mutex; // guards the members below
+    Text name;             // empty if no operation is in progress
     size_t total;
-    double start_seconds; // of the operation
+    double start_seconds; // when the operation began
     bool keeps_spans;
     pthread_t opener;
     double stage_start_seconds;

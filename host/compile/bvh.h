@@ -57,7 +57,7 @@ typedef struct {
 enum { BVH_DEPTH_MAX = 80 };
 
 // Builds the tree of at most 2^28 finite boxes, at most BVH_DEPTH_MAX deep whatever the boxes are.
-// `types[i]` is the type of primitive i; primitives of one leaf are of one type. `stage`, unless NULL,
+// `types[i]` is the type of primitive i. All primitives of a leaf are of one type. `stage`, unless NULL,
 // counts the primitives of finished leaves.
 void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count, BvhLeaves leaves,
                Stage *stage);

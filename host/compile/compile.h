@@ -7,13 +7,14 @@
 
 // Compiles a scene. Rounds each of its numbers to the kernel's precision once, after subtracting the eye's
 // position in double, and derives axes, slopes and squares of a checker from the rounded numbers. Returns
-// false with a message, and nothing to free, if the scene is too large, if a number or a light's distance
-// does not fit the precision, or if a texture cannot be read.
+// false with a message, and nothing to free, if the scene is too large or if a number or a light's distance
+// does not fit the precision.
 bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                    MessageList *messages);
 // Recompiles for another camera, size, samples or bounces. All else in `scene` and `settings` must be what
-// the scene was compiled with. Keeps the BVH's tree, so this takes a fraction of the time. Returns false
-// with messages on failure; `compiled` then belongs to no scene until a move succeeds.
+// the scene was compiled with. Takes a fraction of the time because it keeps the BVH's tree, unless
+// compiled->unit was or becomes other than 1. Returns false with messages on failure. `compiled` then belongs
+// to no scene until a move succeeds or, with such a unit, remains that of the earlier camera.
 bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages);
 

@@ -75,8 +75,8 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
     return (scalar4){v.x, v.y, v.z, w};
 }
 
-// Replaces an array by one of `count` zeroed structs; nodes and blocks of triangles have `width` children or
-// triangles: a power of two, 4 to 16. A narrow array has its reals as floats.
+// Each of these replaces an array by one of `count` zeroed structs. Nodes have `width` children and blocks of
+// triangles have `width` triangles, a power of two from 4 to 16. A narrow array has its reals as floats.
 void flat_array_renew(CompiledScene *compiled, size_t type, size_t count);
 void flat_wide_array_renew(CompiledScene *compiled, size_t type, size_t count, unsigned width,
                            bool is_narrow);

@@ -36,7 +36,7 @@ typedef struct {
 // Returns a transform's map. With `is_exact` the inverse is rounded once from quadruple precision. Otherwise
 // its error is some roundings of a double times the condition, which floats do not resolve.
 InstanceMap instance_map(const Affine *transform, double scale, bool is_exact);
-// Returns the largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
+// Returns the largest sum of a row of |map| |inverse|, which is NAN or infinite if the map has no inverse.
 double map_condition(const InstanceMap *map);
 
 // Rounds the map into the rows of a flat struct, with `place` in their last numbers.
@@ -53,11 +53,11 @@ uint32_t instance_mesh(const CompiledScene *compiled, size_t object);
 // Appends an instance that shares a mesh, or replaces the one that is moved (host/compile/flatten.h).
 void instance_flatten(Flattening *flattening, const Object *object, uint32_t shared_mesh);
 
-// Returns how far mapping a ray to an instance moves its hits, relative to their distance; 0 without
-// instances.
+// Returns how far mapping a ray to an instance moves its hits, relative to their distance. Returns 0 if there
+// are no instances.
 double instance_slack(const CompiledScene *compiled, const CompileSettings *settings);
 
-// Returns the index of an id's ObjectEntry: of an instance's, if the id is in one.
+// Returns the index of an id's ObjectEntry, which is the instance's if the id is in one.
 uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id);
 
 // shared_meshes.c

@@ -1,8 +1,8 @@
+// Bounds a scene's objects.
 #pragma once
 
 #include "host/scene/bounds.h"
 #include "host/scene/scene.h"
 
-// Returns the bounds of all bounded objects; *unbounded_count counts the rest (planes, infinite cylinders and
-// cones).
+// Returns the bounds of all bounded objects. Sets *unbounded_count to the number of the others.
 Bounds scene_bounds(const Scene *scene, size_t *unbounded_count);

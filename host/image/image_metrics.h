@@ -4,7 +4,7 @@
 #include "host/base/message.h"
 #include "host/image/image.h"
 
-// Summarizes the differences test - reference of many values. Excludes pairs without a finite value.
+// Summarizes the differences test - reference of many values. Excludes pairs in which a value is not finite.
 typedef struct {
     size_t count;               // values compared
     double largest, rmse, bias; // bias is the mean difference with its sign

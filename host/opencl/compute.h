@@ -124,8 +124,8 @@ void buffer_release(cl_mem buffer); // accepts NULL
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
-// Maps at least one byte of a buffer from `begin` on for writing `size` bytes of new contents. Returns NULL
-// if the device failed. compute_unmap transfers the contents.
+// Maps `size` bytes of a buffer from `begin` on, at least one, for writing new contents. Returns NULL if the
+// device failed. compute_unmap transfers the contents.
 void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size);
 
 // Creates a read-only buffer of bytes from memory_allocate_large and takes ownership of them, even on

@@ -76,8 +76,8 @@ static void sweep_classify(void *context, size_t begin, size_t end)
     pthread_mutex_unlock(&sweep->mutex);
 }
 
-// Sweeps the first `count` mantissas in order until `deadline`, but at least QUICK_SWEEP of them. Returns
-// whether it swept all.
+// Sweeps the first `count` mantissas in order until `deadline`, or until PASSPORT_SECONDS_MAX later if it has
+// not yet swept QUICK_SWEEP of them. Returns whether it swept all.
 static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint probe, double operand,
                       uint32_t count, double deadline)
 {

@@ -41,7 +41,7 @@ double affine_determinant(const Affine *affine)
                       vector_cross(vector_from(affine->rows[1]), vector_from(affine->rows[2])));
 }
 
-// Transforms normals: the transposed inverse times |determinant|, whose rows are cross products of rows.
+// Computes the rows of the transposed inverse times |determinant| as cross products of rows.
 Affine affine_for_normals(const Affine *affine)
 {
     double side = affine_determinant(affine) < 0 ? -1 : 1;
@@ -73,7 +73,7 @@ void affine_triangle(const Affine *affine, Vector3 vertices[3], Vector3 normals[
     vertices[2] = vertex, normals[2] = normal;
 }
 
-// Sine and cosine of degrees, exact at quarter turns.
+// Sets the sine and cosine of degrees, which are exact at quarter turns.
 static void turn_of(double degrees, double *sine, double *cosine)
 {
     int quarters;
@@ -99,7 +99,7 @@ Affine affine_of_steps(Vector3 scale, Vector3 rotate, Vector3 translate)
     return affine_multiply(&about_z, &turned);
 }
 
-// Rodrigues' formula.
+// Uses Rodrigues' formula (1840).
 Affine affine_about(Vector3 axis, double degrees)
 {
     double sine, cosine;

@@ -36,7 +36,9 @@ typedef struct {
 } AxisScale;
 
 // Returns true if a circle about the axis stays a circle, within a millionth of its radius, and false
-// otherwise. With `is_straight` the axis must also stay perpendicular to the circle.
+// otherwise. With `is_straight` the axis must also stay perpendicular to the circle. Sets *scale in
+// either case.
 bool affine_keeps_circles(const Affine *affine, Vector3 axis, bool is_straight, AxisScale *scale);
-// Returns true if all lengths change by the same factor, within a millionth.
+// Returns true if all lengths change by the same factor, within a millionth. Sets *scale, for the y
+// axis, in either case.
 bool affine_keeps_balls(const Affine *affine, AxisScale *scale);

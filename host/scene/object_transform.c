@@ -10,7 +10,8 @@
 
 static const double NUMBER_LARGEST = 1e30; // of scene files
 
-// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
+// Transforms a mesh's vertices and normals. Returns whether all vertices are within the range. A mirroring
+// transform inverts the winding, and inverting it back keeps the triangles' outer side.
 static bool mesh_transform(Mesh *mesh, const Affine *affine)
 {
     const Affine for_normals = affine_for_normals(affine);

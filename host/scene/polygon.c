@@ -10,7 +10,7 @@ typedef struct {
     double sum, error; // exactly what was added
 } ExactSum;
 
-// Knuth's TwoSum (The art of computer programming 2, 4.2.2).
+// Returns a sum with its error (Knuth, The Art of Computer Programming 2, 4.2.2).
 static ExactSum two_sum(double a, double b)
 {
     double sum = a + b, part = sum - a;

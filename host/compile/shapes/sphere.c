@@ -5,13 +5,13 @@ static Bounds sphere_bounds(const Object *object)
     return bounds_around(object->as.sphere.center, vector_all(object->as.sphere.radius));
 }
 
-// The eye's power |center - eye|^2 - radius^2 in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
-// product, 2005), whose terms cancel to 2^-60 of them if the eye is 2^-60 radii from the surface, and the
-// distance that the rounding of center and radius moves the surface.
 typedef struct {
-    double power, moved;
+    double power; // |center - eye|^2 - radius^2
+    double moved; // the distance that the rounding of center and radius moves the surface
 } EyePower;
 
+// Computes the power in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot product, 2005), because
+// its terms cancel to 2^-60 of them if the eye is 2^-60 radii from the surface.
 static EyePower eye_power(const Rounding *rounding, const Object *object, Vector3 center)
 {
     const Vector3 from = rounding->eye, to = object->as.sphere.center;
