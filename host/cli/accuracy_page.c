@@ -2,9 +2,9 @@
 
 #include "host/base/base64.h"
 #include "host/base/memory.h"
+#include "host/cli/png_bytes.h"
 #include "host/cli/report_json.h"
 #include "host/image/heatmap.h"
-#include "host/image/png_bytes.h"
 #include "host/image/transfer.h"
 #include <math.h>
 #include <stdlib.h>

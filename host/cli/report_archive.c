@@ -1,8 +1,8 @@
 #include "host/cli/report_archive.h"
 
 #include "host/api/version.h"
-#include "host/base/archive.h"
 #include "host/base/array.h"
+#include "host/cli/archive.h"
 #include <dirent.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "host/base/archive.h"
+#include "host/cli/archive.h"
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"

@@ -1,4 +1,4 @@
-#include "host/image/png_bytes.h"
+#include "host/cli/png_bytes.h"
 
 #include "host/base/array.h"
 #include "host/base/fault.h"
