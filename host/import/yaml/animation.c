@@ -19,11 +19,6 @@ typedef struct {
 
 typedef ARRAY_OF(Key) Keys;
 
-static const YamlNode *node_at(const YamlReader *reader, uint32_t index)
-{
-    return &reader->tree.nodes.items[index];
-}
-
 static bool node_number(const YamlReader *reader, const YamlNode *node, double *value)
 {
     const char *text = yaml_text(&reader->tree, node);
@@ -120,16 +115,17 @@ static uint32_t number_between(YamlReader *reader, const YamlNode *a, const Yaml
 // Adds the value at fraction `part` between two values and returns its index.
 static uint32_t value_between(YamlReader *reader, uint32_t a, uint32_t b, double part)
 {
-    if (node_at(reader, a)->type == YAML_SCALAR)
-        return number_between(reader, node_at(reader, a), node_at(reader, b), part);
+    if (yaml_node(&reader->tree, a)->type == YAML_SCALAR)
+        return number_between(reader, yaml_node(&reader->tree, a), yaml_node(&reader->tree, b), part);
     YamlTree *tree = &reader->tree;
-    const YamlNode list = *node_at(reader, a);
+    const YamlNode list = *yaml_node(&reader->tree, a);
     array_push(tree->nodes, list);
     const uint32_t index = (uint32_t)(tree->nodes.count - 1);
     uint32_t last = 0;
-    for (a = list.first, b = node_at(reader, b)->first; a;
-         a = node_at(reader, a)->next, b = node_at(reader, b)->next) {
-        const uint32_t child = number_between(reader, node_at(reader, a), node_at(reader, b), part);
+    for (a = list.first, b = yaml_node(&reader->tree, b)->first; a;
+         a = yaml_node(&reader->tree, a)->next, b = yaml_node(&reader->tree, b)->next) {
+        const uint32_t child =
+            number_between(reader, yaml_node(&reader->tree, a), yaml_node(&reader->tree, b), part);
         *(last ? &tree->nodes.items[last].next : &tree->nodes.items[index].first) = child;
         last = child;
     }
@@ -158,12 +154,13 @@ static bool value_animate(YamlReader *reader, uint32_t index)
     };
     Keys keys = {0};
     Animation animation = {.ease = EASE_LINEAR};
-    const bool is_read =
-        fields_read(reader, node_at(reader, index), "animation", fields, COUNT_OF(fields), &animation) &&
-        keys_read(reader, animation.keys, &keys);
+    const bool is_read = fields_read(reader, yaml_node(&reader->tree, index), "animation", fields,
+                                     COUNT_OF(fields), &animation) &&
+                         keys_read(reader, animation.keys, &keys);
     if (is_read) {
-        YamlNode value = *node_at(reader, keys_value(reader, &keys, animation.ease, reader->options->frame));
-        value.next = node_at(reader, index)->next;
+        YamlNode value =
+            *yaml_node(&reader->tree, keys_value(reader, &keys, animation.ease, reader->options->frame));
+        value.next = yaml_node(&reader->tree, index)->next;
         reader->tree.nodes.items[index] = value;
         reader->scene->animation.has_keys = true;
         reader->scene->animation.frame = reader->options->frame;
@@ -176,15 +173,17 @@ static bool value_animate(YamlReader *reader, uint32_t index)
 // there are animated, since aliases may share them. It is NULL if there are no aliases.
 static bool node_animate(YamlReader *reader, uint32_t index, uint8_t *visited)
 {
-    if (yaml_has_keys(reader, node_at(reader, index))) return value_animate(reader, index);
+    if (yaml_has_keys(reader, yaml_node(&reader->tree, index))) return value_animate(reader, index);
     bool all_read = true;
-    const uint32_t first = node_at(reader, index)->type == YAML_SCALAR ? 0 : node_at(reader, index)->first;
+    const uint32_t first =
+        yaml_node(&reader->tree, index)->type == YAML_SCALAR ? 0 : yaml_node(&reader->tree, index)->first;
     if (first > 0 && visited) {
         if (visited[first / 8] >> first % 8 & 1) return true;
         visited[first / 8] |= (uint8_t)(1 << first % 8);
     }
-    for (uint32_t child = first; child > 0; child = node_at(reader, child)->next)
-        if (node_at(reader, child)->type != YAML_SCALAR) all_read &= node_animate(reader, child, visited);
+    for (uint32_t child = first; child > 0; child = yaml_node(&reader->tree, child)->next)
+        if (yaml_node(&reader->tree, child)->type != YAML_SCALAR)
+            all_read &= node_animate(reader, child, visited);
     return all_read;
 }
 

@@ -18,8 +18,9 @@ typedef struct {
 
 typedef struct {
     YamlReader *reader;
-    Source *last; // source of the latest file
-    size_t base;  // base of the next file's offsets
+    YamlTree *tree; // of the reader
+    Source *last;   // source of the latest file
+    size_t base;    // base of the next file's offsets
     // The first is the scene's.
     KnownFile files[1 + FILES_MAX];
     size_t file_count;
@@ -46,26 +47,21 @@ typedef struct {
     uint32_t joined[SECTION_COUNT]; // the last child that came from a file; 0: none did
 } Joined;
 
-static YamlNode *node_at(const Includes *includes, uint32_t index)
-{
-    return &includes->reader->tree.nodes.items[index];
-}
-
 // Returns the index of the section that a key names, or SECTION_COUNT.
 static size_t section_of(const Includes *includes, uint32_t key)
 {
-    return name_find(NAMES_OF(sections), yaml_text(&includes->reader->tree, node_at(includes, key)));
+    return name_find(NAMES_OF(sections), yaml_text(includes->tree, yaml_node(includes->tree, key)));
 }
 
 static Joined joined_open(const Includes *includes, uint32_t root)
 {
     Joined joined = {.root = root};
-    for (uint32_t key = node_at(includes, root)->first; key > 0;) {
-        const uint32_t value = node_at(includes, key)->next;
+    for (uint32_t key = yaml_node(includes->tree, root)->first; key > 0;) {
+        const uint32_t value = yaml_node(includes->tree, key)->next;
         const size_t section = section_of(includes, key);
         if (section < SECTION_COUNT && joined.values[section] == 0) joined.values[section] = value;
         joined.last = value;
-        key = node_at(includes, value)->next;
+        key = yaml_node(includes->tree, value)->next;
     }
     return joined;
 }
@@ -73,10 +69,10 @@ static Joined joined_open(const Includes *includes, uint32_t root)
 // Appends a key and its value to the mapping.
 static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
 {
-    YamlNode *root = node_at(includes, joined->root);
-    const uint32_t value = node_at(includes, key)->next;
-    *(joined->last > 0 ? &node_at(includes, joined->last)->next : &root->first) = key;
-    node_at(includes, value)->next = 0;
+    YamlNode *root = yaml_node(includes->tree, joined->root);
+    const uint32_t value = yaml_node(includes->tree, key)->next;
+    *(joined->last > 0 ? &yaml_node(includes->tree, joined->last)->next : &root->first) = key;
+    yaml_node(includes->tree, value)->next = 0;
     root->child_count += 2;
     joined->last = value;
 }
@@ -84,8 +80,8 @@ static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
 // Returns the last child of a nonempty collection.
 static uint32_t last_child(const Includes *includes, uint32_t node)
 {
-    uint32_t last = node_at(includes, node)->first;
-    for (uint32_t child = last; child > 0; child = node_at(includes, child)->next)
+    uint32_t last = yaml_node(includes->tree, node)->first;
+    for (uint32_t child = last; child > 0; child = yaml_node(includes->tree, child)->next)
         last = child;
     return last;
 }
@@ -94,15 +90,15 @@ static uint32_t last_child(const Includes *includes, uint32_t node)
 // before the mapping's.
 static void children_join(const Includes *includes, Joined *joined, size_t section, uint32_t from)
 {
-    if (node_at(includes, from)->child_count == 0) return;
-    yaml_children_unshare(&includes->reader->tree, from);
-    YamlNode *to = node_at(includes, joined->values[section]);
+    if (yaml_node(includes->tree, from)->child_count == 0) return;
+    yaml_children_unshare(includes->tree, from);
+    YamlNode *to = yaml_node(includes->tree, joined->values[section]);
     const uint32_t last = last_child(includes, from);
     uint32_t *link =
-        joined->joined[section] > 0 ? &node_at(includes, joined->joined[section])->next : &to->first;
-    node_at(includes, last)->next = *link;
-    *link = node_at(includes, from)->first;
-    to->child_count += node_at(includes, from)->child_count;
+        joined->joined[section] > 0 ? &yaml_node(includes->tree, joined->joined[section])->next : &to->first;
+    yaml_node(includes->tree, last)->next = *link;
+    *link = yaml_node(includes->tree, from)->first;
+    to->child_count += yaml_node(includes->tree, from)->child_count;
     joined->joined[section] = last;
 }
 
@@ -110,18 +106,19 @@ static void children_join(const Includes *includes, Joined *joined, size_t secti
 static void pair_join(const Includes *includes, Joined *joined, size_t section, uint32_t key)
 {
     YamlReader *reader = includes->reader;
-    const uint32_t value = node_at(includes, key)->next, existing = joined->values[section];
+    const uint32_t value = yaml_node(includes->tree, key)->next, existing = joined->values[section];
     const YamlType type = sections[section].type;
     const bool is_joined = type != YAML_SCALAR;
-    if (is_joined && !node_has_type(reader, node_at(includes, value), type, sections[section].name)) return;
+    if (is_joined && !node_has_type(reader, yaml_node(includes->tree, value), type, sections[section].name))
+        return;
     if (existing == 0) {
         joined->values[section] = value;
-        if (is_joined && node_at(includes, value)->child_count > 0) {
+        if (is_joined && yaml_node(includes->tree, value)->child_count > 0) {
             yaml_children_unshare(&reader->tree, value);
             joined->joined[section] = last_child(includes, value);
         }
         pair_append(includes, joined, key);
-    } else if (is_joined && node_at(includes, existing)->type == type) {
+    } else if (is_joined && yaml_node(includes->tree, existing)->type == type) {
         children_join(includes, joined, section, value);
     }
 }
@@ -131,13 +128,13 @@ static void file_join(const Includes *includes, Joined *joined, uint32_t root)
 {
     YamlReader *reader = includes->reader;
     bool seen[SECTION_COUNT] = {false};
-    for (uint32_t key = node_at(includes, root)->first, next; key > 0; key = next) {
+    for (uint32_t key = yaml_node(includes->tree, root)->first, next; key > 0; key = next) {
         const size_t section = section_of(includes, key);
-        next = node_at(includes, node_at(includes, key)->next)->next;
+        next = yaml_node(includes->tree, yaml_node(includes->tree, key)->next)->next;
         if (section == SECTION_COUNT) { // unknown, which is reported with all others
             pair_append(includes, joined, key);
         } else if (seen[section]) {
-            report_error(&reader->report, node_at(includes, key)->offset, "'%s' is given twice",
+            report_error(&reader->report, yaml_node(includes->tree, key)->offset, "'%s' is given twice",
                          sections[section].name);
         } else {
             seen[section] = true;
@@ -172,7 +169,7 @@ static bool text_parse(Includes *includes, Source *source, uint32_t *root)
     const bool is_read = yaml_tree_read(&reader->tree, &report, includes->base, reader->options->stage);
     includes->base += source->length + 1;
     report_include(&reader->report, &report);
-    return is_read && node_has_type(reader, node_at(includes, *root), YAML_MAPPING, "scene");
+    return is_read && node_has_type(reader, yaml_node(includes->tree, *root), YAML_MAPPING, "scene");
 }
 
 static bool includes_read(Includes *includes, uint32_t root);
@@ -233,10 +230,10 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
 static uint32_t include_remove(const Includes *includes, uint32_t root)
 {
     YamlReader *reader = includes->reader;
-    uint32_t found = 0, *link = &node_at(includes, root)->first;
+    uint32_t found = 0, *link = &yaml_node(includes->tree, root)->first;
     while (*link > 0) {
-        const YamlNode *key = node_at(includes, *link);
-        YamlNode *value = node_at(includes, key->next);
+        const YamlNode *key = yaml_node(includes->tree, *link);
+        YamlNode *value = yaml_node(includes->tree, key->next);
         if (!yaml_is(&reader->tree, key, "include")) {
             link = &value->next;
             continue;
@@ -246,7 +243,7 @@ static uint32_t include_remove(const Includes *includes, uint32_t root)
         else
             found = key->next;
         *link = value->next;
-        node_at(includes, root)->child_count -= 2;
+        yaml_node(includes->tree, root)->child_count -= 2;
     }
     return found;
 }
@@ -256,20 +253,21 @@ static bool includes_read(Includes *includes, uint32_t root)
 {
     const uint32_t include = include_remove(includes, root);
     if (include == 0) return true;
-    const bool is_list = node_at(includes, include)->type == YAML_SEQUENCE;
+    const bool is_list = yaml_node(includes->tree, include)->type == YAML_SEQUENCE;
     Joined joined = joined_open(includes, root);
     bool all_read = true;
-    for (uint32_t file = is_list ? node_at(includes, include)->first : include; file > 0;) {
-        all_read &= file_include(includes, &joined, node_at(includes, file));
+    for (uint32_t file = is_list ? yaml_node(includes->tree, include)->first : include; file > 0;) {
+        all_read &= file_include(includes, &joined, yaml_node(includes->tree, file));
         if (includes->is_full || report_is_full(&includes->reader->report)) return false;
-        file = is_list ? node_at(includes, file)->next : 0;
+        file = is_list ? yaml_node(includes->tree, file)->next : 0;
     }
     return all_read;
 }
 
 bool yaml_include(YamlReader *reader, Source *source)
 {
-    Includes includes = {.reader = reader, .last = source, .base = source->length + 1, .file_count = 1};
+    Includes includes = {
+        .reader = reader, .tree = &reader->tree, .last = source, .base = source->length + 1, .file_count = 1};
     if (reader->tree.nodes.items->type != YAML_MAPPING) return true; // is reported with its keys
     includes.files[0] = (KnownFile){file_id(source->file), true};
     return includes_read(&includes, 0) && reader->report.error_count == 0;

@@ -23,11 +23,6 @@ typedef struct {
     (path)->parent_end > 0 ? (int)(path)->parent_end : (int)strlen("scene"),                                 \
         (path)->parent_end > 0 ? (path)->text : "scene"
 
-static YamlNode *node_at(const Path *path, uint32_t index)
-{
-    return &path->tree->nodes.items[index];
-}
-
 // Adds a scalar without a parent, at an offset of the override's text.
 static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
 {
@@ -45,8 +40,8 @@ static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
 // Appends a child to the path's node, whose last one so far is `last`, or 0 if it is empty.
 static void child_append(const Path *path, uint32_t last, uint32_t child)
 {
-    *(last ? &node_at(path, last)->next : &node_at(path, path->node)->first) = child;
-    node_at(path, path->node)->child_count++;
+    *(last ? &yaml_node(path->tree, last)->next : &yaml_node(path->tree, path->node)->first) = child;
+    yaml_node(path->tree, path->node)->child_count++;
 }
 
 // Returns whether the path's node has the type. Reports an error if it does not.
@@ -54,7 +49,7 @@ static bool node_is(const Path *path, YamlType type)
 {
     static const char *const names[] = {
         [YAML_SCALAR] = "a value", [YAML_SEQUENCE] = "a list", [YAML_MAPPING] = "a mapping"};
-    const YamlType found = node_at(path, path->node)->type;
+    const YamlType found = yaml_node(path->tree, path->node)->type;
     if (found == type) return true;
     return report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path), names[found],
                         names[type]);
@@ -87,7 +82,7 @@ static bool missing_report(const Path *path, const char *name, size_t start)
 {
     const char *known[NAMES_COMPARED_MAX];
     size_t known_count = 0;
-    for (const YamlNode *key = yaml_first(path->tree, node_at(path, path->node));
+    for (const YamlNode *key = yaml_first(path->tree, yaml_node(path->tree, path->node));
          key && known_count < NAMES_COMPARED_MAX; key = yaml_next(path->tree, yaml_next(path->tree, key)))
         if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
     Text choices = {0};
@@ -111,10 +106,10 @@ static bool key_follow(Path *path, const char *name, size_t start)
 {
     if (!node_is(path, YAML_MAPPING)) return false;
     yaml_children_unshare(path->tree, path->node);
-    uint32_t last = 0, key = node_at(path, path->node)->first;
-    for (; key; key = node_at(path, last)->next) {
-        if (yaml_is(path->tree, node_at(path, key), name)) break;
-        last = node_at(path, key)->next;
+    uint32_t last = 0, key = yaml_node(path->tree, path->node)->first;
+    for (; key; key = yaml_node(path->tree, last)->next) {
+        if (yaml_is(path->tree, yaml_node(path->tree, key), name)) break;
+        last = yaml_node(path->tree, key)->next;
     }
     if (!key) {
         if (!can_add(path)) return missing_report(path, name, start);
@@ -123,7 +118,7 @@ static bool key_follow(Path *path, const char *name, size_t start)
         child_append(path, last, key);
         child_append(path, key, value);
     }
-    path_move(path, last, node_at(path, key)->next);
+    path_move(path, last, yaml_node(path->tree, key)->next);
     return true;
 }
 
@@ -131,15 +126,15 @@ static bool key_follow(Path *path, const char *name, size_t start)
 static bool index_follow(Path *path, uint32_t index, size_t start)
 {
     if (!node_is(path, YAML_SEQUENCE)) return false;
-    const uint32_t count = node_at(path, path->node)->child_count;
+    const uint32_t count = yaml_node(path->tree, path->node)->child_count;
     if (index > count || (index == count && !can_add(path)))
         return report_error(path->report, start, "'%.*s' has %u element%s, counted from [0]", PARENT(path),
                             count, text_plural(count));
     yaml_children_unshare(path->tree, path->node);
-    uint32_t last = 0, child = node_at(path, path->node)->first;
+    uint32_t last = 0, child = yaml_node(path->tree, path->node)->first;
     for (uint32_t i = 0; i < index; i++) {
         last = child;
-        child = node_at(path, child)->next;
+        child = yaml_node(path->tree, child)->next;
     }
     if (index == count) {
         child = scalar_add(path, "", start);
@@ -205,9 +200,9 @@ static bool value_read(const Path *path, uint32_t *root)
 
 static void node_remove(const Path *path)
 {
-    const uint32_t next = node_at(path, path->node)->next;
-    YamlNode *parent = node_at(path, path->parent);
-    *(path->previous ? &node_at(path, path->previous)->next : &parent->first) = next;
+    const uint32_t next = yaml_node(path->tree, path->node)->next;
+    YamlNode *parent = yaml_node(path->tree, path->parent);
+    *(path->previous ? &yaml_node(path->tree, path->previous)->next : &parent->first) = next;
     parent->child_count -= parent->type == YAML_MAPPING ? 2 : 1;
 }
 
@@ -221,9 +216,9 @@ static bool override_apply(YamlTree *tree, Report *report, size_t base)
         return true;
     }
     if (!value_read(&path, &value)) return false;
-    const uint32_t next = node_at(&path, path.node)->next;
-    *node_at(&path, path.node) = *node_at(&path, value);
-    node_at(&path, path.node)->next = next;
+    const uint32_t next = yaml_node(path.tree, path.node)->next;
+    *yaml_node(path.tree, path.node) = *yaml_node(path.tree, value);
+    yaml_node(path.tree, path.node)->next = next;
     return true;
 }
 

@@ -39,6 +39,12 @@ void yaml_tree_free(YamlTree *tree);
 // Copies the children of a node if an alias may share them.
 void yaml_children_unshare(YamlTree *tree, uint32_t node);
 
+// Returns the node of an index. It moves when nodes are added.
+static inline YamlNode *yaml_node(const YamlTree *tree, uint32_t index)
+{
+    return &tree->nodes.items[index];
+}
+
 // Returns the next child, or NULL at the end. A mapping's children are key, value, key, value …
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node);
 const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node);
