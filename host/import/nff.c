@@ -21,12 +21,12 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-static bool read_color(NffReader *reader, Color *color)
+static bool color_read(NffReader *reader, Color *color)
 {
     return line_vector(&reader->line, "color", &range_not_negative, color);
 }
 
-static bool read_size(Line *line, const char *name, const Range *range, void *value)
+static bool size_read(Line *line, const char *name, const Range *range, void *value)
 {
     unsigned *size = value;
     (void)name;
@@ -47,7 +47,7 @@ static const LineField view_keys[] = {
     {"up", line_vector, offsetof(View, up), NULL},
     {"angle", line_number, offsetof(View, angle), &range_half_turn},
     {"hither", line_number, offsetof(View, hither), NULL},
-    {"resolution", read_size, offsetof(View, size), &range_pixels},
+    {"resolution", size_read, offsetof(View, size), &range_pixels},
 };
 enum { VIEW_REQUIRED = 4, VIEW_KEYS = COUNT_OF(view_keys) };
 
@@ -59,7 +59,7 @@ static size_t view_key_index(Word word)
     return index;
 }
 
-static bool read_view(NffReader *reader)
+static bool view_read(NffReader *reader)
 {
     const size_t offset = reader->line.start;
     if (!line_is_first(&reader->line, &reader->has_view, "view")) return false;
@@ -92,31 +92,31 @@ static bool read_view(NffReader *reader)
     return true;
 }
 
-static bool read_background(NffReader *reader)
+static bool background_read(NffReader *reader)
 {
     return line_is_first(&reader->line, &reader->has_background, "background") &&
-           read_color(reader, &reader->scene->background) && line_end(&reader->line);
+           color_read(reader, &reader->scene->background) && line_end(&reader->line);
 }
 
-static bool read_light(NffReader *reader)
+static bool light_read(NffReader *reader)
 {
     Light light = {.type = LIGHT_POINT};
     if (!line_vector(&reader->line, "position", NULL, &light.position)) return false;
     if (!line_peek(&reader->line).length)
         array_push(reader->white_lights, reader->scene->lights.count);
-    else if (!read_color(reader, &light.color))
+    else if (!color_read(reader, &light.color))
         return false;
     array_push(reader->scene->lights, light);
     return line_end(&reader->line);
 }
 
-static bool read_material(NffReader *reader)
+static bool material_read(NffReader *reader)
 {
     Material material = material_default();
     Line *line = &reader->line;
     double ior;
     reader->has_material = true;
-    if (!read_color(reader, &material.color) ||
+    if (!color_read(reader, &material.color) ||
         !line_number(line, "Kd", &range_not_negative, &material.ambient) ||
         !line_number(line, "Ks", &range_unit, &material.specular.largest) ||
         !line_number(line, "Shine", &range_not_negative, &material.shininess) ||
@@ -144,7 +144,7 @@ static void object_add(NffReader *reader, Object object)
     array_push(reader->scene->objects, object);
 }
 
-static bool read_sphere(NffReader *reader)
+static bool sphere_read(NffReader *reader)
 {
     Object object = {.type = SHAPE_SPHERE};
     double radius;
@@ -159,7 +159,7 @@ static bool read_sphere(NffReader *reader)
 }
 
 // Reads a cone, or a cylinder if both radii are equal.
-static bool read_cone(NffReader *reader)
+static bool cone_read(NffReader *reader)
 {
     Vector3 base, apex;
     double base_radius, apex_radius;
@@ -196,7 +196,7 @@ static bool read_cone(NffReader *reader)
     return true;
 }
 
-static bool read_corners(NffReader *reader, bool smooth)
+static bool corners_read(NffReader *reader, bool smooth)
 {
     unsigned count;
     if (!line_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
@@ -216,10 +216,10 @@ static bool read_corners(NffReader *reader, bool smooth)
     return line_end(&reader->line);
 }
 
-static bool read_any_polygon(NffReader *reader, bool smooth)
+static bool any_polygon_read(NffReader *reader, bool smooth)
 {
     size_t offset = reader->line.start;
-    if (!read_corners(reader, smooth)) return false;
+    if (!corners_read(reader, smooth)) return false;
     switch (polygon_triangulate(reader->corners.items, reader->corners.count, &reader->triangles)) {
     case POLYGON_WITHOUT_AREA:
         report_warning(&reader->report, offset, "a degenerate polygon is never hit");
@@ -242,14 +242,14 @@ static bool read_any_polygon(NffReader *reader, bool smooth)
     return true;
 }
 
-static bool read_polygon(NffReader *reader)
+static bool polygon_read(NffReader *reader)
 {
-    return read_any_polygon(reader, false);
+    return any_polygon_read(reader, false);
 }
 
-static bool read_patch(NffReader *reader)
+static bool patch_read(NffReader *reader)
 {
-    return read_any_polygon(reader, true);
+    return any_polygon_read(reader, true);
 }
 
 // Each `read` reads the words after an element's name up to the end of a line. Reports the first error and
@@ -258,8 +258,8 @@ static const struct {
     const char *name;
     bool (*read)(NffReader *reader);
 } elements[] = {
-    {"v", read_view}, {"b", read_background}, {"l", read_light},   {"f", read_material},
-    {"c", read_cone}, {"s", read_sphere},     {"p", read_polygon}, {"pp", read_patch},
+    {"v", view_read}, {"b", background_read}, {"l", light_read},   {"f", material_read},
+    {"c", cone_read}, {"s", sphere_read},     {"p", polygon_read}, {"pp", patch_read},
 };
 
 // Reads an element. After an error, skips the rest of its line and the lines that may belong to it.

@@ -18,7 +18,7 @@ typedef struct {
 static const Range range_axis = {-1, 1, false, "from -1 to 1"},
                    range_ratio = {0, 1, false, "from 0 to 1; with --lenient 0 or more"};
 
-static bool read_color(Line *line, Color *color)
+static bool color_read(Line *line, Color *color)
 {
     if (!line_comma_vector(line, "color", &range_byte, color)) return false;
     *color = vector_scale(*color, 1.0 / 255);
@@ -26,7 +26,7 @@ static bool read_color(Line *line, Color *color)
 }
 
 // Reads a unit vector. Normalizes the other lengths that files often have, and leaves zero unchanged.
-static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
+static bool unit_vector_read(Line *line, const char *name, Vector3 *axis)
 {
     const double tolerated = 0.01; // files round to two or three digits
     size_t offset = line_peek(line).offset;
@@ -37,10 +37,10 @@ static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
     return true;
 }
 
-static bool read_axis(Line *line, const char *name, Vector3 *axis)
+static bool axis_read(Line *line, const char *name, Vector3 *axis)
 {
     size_t offset = line_peek(line).offset;
-    if (!read_unit_vector(line, name, axis)) return false;
+    if (!unit_vector_read(line, name, axis)) return false;
     if (vector_is_zero(*axis)) report_error(line->report, offset, "'%s' must not be zero", name);
     return !vector_is_zero(*axis);
 }
@@ -65,7 +65,7 @@ static bool finish_follows(const RtReader *reader)
 }
 
 // Reads the optional specular and shininess at the end of an object's line.
-static bool read_finish(RtReader *reader, Material *material)
+static bool finish_read(RtReader *reader, Material *material)
 {
     Line *line = &reader->line;
     if (finish_follows(reader) &&
@@ -75,13 +75,13 @@ static bool read_finish(RtReader *reader, Material *material)
     return element_end(reader);
 }
 
-static bool read_material(RtReader *reader, Material *material)
+static bool material_read(RtReader *reader, Material *material)
 {
-    return read_color(&reader->line, &material->color) && read_finish(reader, material);
+    return color_read(&reader->line, &material->color) && finish_read(reader, material);
 }
 
 // Reads the brightness of a light, which is at most 1 unless --lenient is given.
-static bool read_ratio(RtReader *reader, double *ratio)
+static bool ratio_read(RtReader *reader, double *ratio)
 {
     const size_t offset = line_peek(&reader->line).offset;
     const Range *range = reader->lenient ? &range_not_negative : &range_ratio;
@@ -90,25 +90,25 @@ static bool read_ratio(RtReader *reader, double *ratio)
     return true;
 }
 
-static bool read_ambient(RtReader *reader)
+static bool ambient_read(RtReader *reader)
 {
     double ratio;
     Color color;
-    if (!line_is_first(&reader->line, &reader->has_ambient, "ambient light") || !read_ratio(reader, &ratio) ||
-        !read_color(&reader->line, &color) || !element_end(reader))
+    if (!line_is_first(&reader->line, &reader->has_ambient, "ambient light") || !ratio_read(reader, &ratio) ||
+        !color_read(&reader->line, &color) || !element_end(reader))
         return false;
     reader->scene->ambient = vector_scale(color, ratio);
     return true;
 }
 
-static bool read_camera(RtReader *reader, Camera *camera)
+static bool camera_read(RtReader *reader, Camera *camera)
 {
     Line *line = &reader->line;
     Vector3 position, direction;
     double fov_degrees;
     if (!line_comma_vector(line, "position", NULL, &position)) return false;
     size_t offset = line_peek(line).offset;
-    if (!read_unit_vector(line, "direction", &direction) ||
+    if (!unit_vector_read(line, "direction", &direction) ||
         !line_number(line, "fov", &range_half_turn, &fov_degrees) || !element_end(reader))
         return false;
     if (vector_is_zero(direction)) {
@@ -122,35 +122,35 @@ static bool read_camera(RtReader *reader, Camera *camera)
     return true;
 }
 
-static bool read_only_camera(RtReader *reader)
+static bool only_camera_read(RtReader *reader)
 {
     return line_is_first(&reader->line, &reader->has_camera, "camera") &&
-           read_camera(reader, &reader->scene->camera);
+           camera_read(reader, &reader->scene->camera);
 }
 
 // Reads the older subject's `c`, which a file may repeat.
-static bool read_one_camera(RtReader *reader)
+static bool one_camera_read(RtReader *reader)
 {
-    if (!reader->has_camera) return read_only_camera(reader);
+    if (!reader->has_camera) return only_camera_read(reader);
     report_warning(&reader->report, reader->line.start, "only the first camera is used");
     Camera unused = {0};
-    return read_camera(reader, &unused);
+    return camera_read(reader, &unused);
 }
 
-static bool read_light(RtReader *reader)
+static bool light_read(RtReader *reader)
 {
     Line *line = &reader->line;
     Light light = {.type = LIGHT_POINT, .color = {1, 1, 1}};
     double ratio;
-    if (!line_comma_vector(line, "position", NULL, &light.position) || !read_ratio(reader, &ratio) ||
-        (line_peek(line).length && !read_color(line, &light.color)) || !element_end(reader))
+    if (!line_comma_vector(line, "position", NULL, &light.position) || !ratio_read(reader, &ratio) ||
+        (line_peek(line).length && !color_read(line, &light.color)) || !element_end(reader))
         return false;
     light.color = vector_scale(light.color, ratio);
     array_push(reader->scene->lights, light);
     return true;
 }
 
-static bool read_resolution(RtReader *reader)
+static bool resolution_read(RtReader *reader)
 {
     return line_is_first(&reader->line, &reader->has_size, "resolution") &&
            line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
@@ -158,48 +158,48 @@ static bool read_resolution(RtReader *reader)
            element_end(reader);
 }
 
-static bool read_sphere(RtReader *reader)
+static bool sphere_read(RtReader *reader)
 {
     Object object = {.type = SHAPE_SPHERE};
     Material material = material_default();
     double diameter;
     if (!line_comma_vector(&reader->line, "center", NULL, &object.as.sphere.center) ||
         !line_number(&reader->line, "diameter", &range_positive, &diameter) ||
-        !read_material(reader, &material))
+        !material_read(reader, &material))
         return false;
     object.as.sphere.radius = diameter / 2;
     scene_add_object(reader->scene, object, &material);
     return true;
 }
 
-static bool read_plane(RtReader *reader)
+static bool plane_read(RtReader *reader)
 {
     Object object = {.type = SHAPE_PLANE};
     Material material = material_default();
     if (!line_comma_vector(&reader->line, "point", NULL, &object.as.plane.point) ||
-        !read_axis(&reader->line, "normal", &object.as.plane.normal) || !read_material(reader, &material))
+        !axis_read(&reader->line, "normal", &object.as.plane.normal) || !material_read(reader, &material))
         return false;
     scene_add_object(reader->scene, object, &material);
     return true;
 }
 
-static bool read_cylinder(RtReader *reader)
+static bool cylinder_read(RtReader *reader)
 {
     Line *line = &reader->line;
     Object object = {.type = SHAPE_CYLINDER, .as.cylinder = {.finite = true, .caps = true}};
     Material material = material_default();
     Vector3 center, axis;
     double diameter, height;
-    if (!line_comma_vector(line, "center", NULL, &center) || !read_axis(line, "axis", &axis)) return false;
+    if (!line_comma_vector(line, "center", NULL, &center) || !axis_read(line, "axis", &axis)) return false;
     const Word third = line_peek_vector(line);
     const bool color_first = memchr(third.text, ',', third.length) != NULL;
     if (color_first) {
         report_warning(&reader->report, third.offset, "the color stands before the sizes");
-        if (!read_color(line, &material.color)) return false;
+        if (!color_read(line, &material.color)) return false;
     }
     if (!line_number(line, "diameter", &range_positive, &diameter) ||
         !line_number(line, "height", &range_positive, &height) ||
-        !(color_first ? read_finish(reader, &material) : read_material(reader, &material)))
+        !(color_first ? finish_read(reader, &material) : material_read(reader, &material)))
         return false;
     object.as.cylinder.from = vector_subtract(center, vector_scale(axis, height / 2));
     object.as.cylinder.axis = vector_scale(axis, height);
@@ -209,16 +209,16 @@ static bool read_cylinder(RtReader *reader)
 }
 
 // Reads the bonus part's cone: its base center, its axis towards the tip and its height.
-static bool read_cone(RtReader *reader)
+static bool cone_read(RtReader *reader)
 {
     Line *line = &reader->line;
     Object object = {.type = SHAPE_CONE, .as.cone = {.finite = true, .caps = true}};
     Material material = material_default();
     Vector3 axis;
     double diameter, height;
-    if (!line_comma_vector(line, "base", NULL, &object.as.cone.from) || !read_axis(line, "axis", &axis) ||
+    if (!line_comma_vector(line, "base", NULL, &object.as.cone.from) || !axis_read(line, "axis", &axis) ||
         !line_number(line, "diameter", &range_positive, &diameter) ||
-        !line_number(line, "height", &range_positive, &height) || !read_material(reader, &material))
+        !line_number(line, "height", &range_positive, &height) || !material_read(reader, &material))
         return false;
     object.as.cone.axis = vector_scale(axis, height);
     object.as.cone.radius[0] = diameter / 2;
@@ -228,14 +228,14 @@ static bool read_cone(RtReader *reader)
 
 // Reads a square with one pair of horizontal sides, because the subject leaves the rotation about the normal
 // unspecified.
-static bool read_square(RtReader *reader)
+static bool square_read(RtReader *reader)
 {
     Vector3 center, normal;
     Material material = material_default();
     double side;
     if (!line_comma_vector(&reader->line, "center", NULL, &center) ||
-        !read_axis(&reader->line, "normal", &normal) ||
-        !line_number(&reader->line, "side", &range_positive, &side) || !read_material(reader, &material))
+        !axis_read(&reader->line, "normal", &normal) ||
+        !line_number(&reader->line, "side", &range_positive, &side) || !material_read(reader, &material))
         return false;
     Vector3 level = vector_cross((Vector3){0, 1, 0}, normal);
     level = vector_is_zero(level) ? (Vector3){1, 0, 0} : vector_normalize(level);
@@ -254,14 +254,14 @@ static bool read_square(RtReader *reader)
     return true;
 }
 
-static bool read_triangle(RtReader *reader)
+static bool triangle_read(RtReader *reader)
 {
     Object object = {.type = SHAPE_TRIANGLE};
     Material material = material_default();
     for (size_t i = 0; i < 3; i++) {
         if (!line_comma_vector(&reader->line, "vertex", NULL, &object.as.triangle.vertices[i])) return false;
     }
-    if (!read_material(reader, &material)) return false;
+    if (!material_read(reader, &material)) return false;
     scene_add_object(reader->scene, object, &material);
     return true;
 }
@@ -271,9 +271,9 @@ static const struct {
     const char *name;
     bool (*read)(RtReader *reader);
 } elements[] = {
-    {"A", read_ambient},   {"C", read_only_camera}, {"c", read_one_camera}, {"L", read_light},
-    {"l", read_light},     {"R", read_resolution},  {"sp", read_sphere},    {"pl", read_plane},
-    {"cy", read_cylinder}, {"co", read_cone},       {"sq", read_square},    {"tr", read_triangle},
+    {"A", ambient_read},   {"C", only_camera_read}, {"c", one_camera_read}, {"L", light_read},
+    {"l", light_read},     {"R", resolution_read},  {"sp", sphere_read},    {"pl", plane_read},
+    {"cy", cylinder_read}, {"co", cone_read},       {"sq", square_read},    {"tr", triangle_read},
 };
 
 static void element_read(void *context)

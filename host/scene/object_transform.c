@@ -113,8 +113,8 @@ static bool shape_transform(Object *object, const Affine *affine)
     return true;
 }
 
-// Returns whether all numbers are within the range, and those above 0 that must be.
-static bool numbers_fit(Object *object)
+// Returns whether all numbers of a shape are within the range, and those above 0 that must be.
+static bool shape_fits(Object *object)
 {
     const ShapeMembers members = shape_members(object);
     const bool is_cone = object->type == SHAPE_CONE;
@@ -151,7 +151,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
         oval_make(object);
         oval_transform(object, affine);
     }
-    if (!numbers_fit(object)) return out_of_range;
+    if (!shape_fits(object)) return out_of_range;
     return object->type != SHAPE_OVAL || oval_is_moderate(object)
                ? NULL
                : "gets thinner than a millionth of its length, or leans by more than 89.9 degrees";
