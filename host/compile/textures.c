@@ -77,16 +77,13 @@ static void level_halve(Texel *coarse, const Texel *fine, uint32_t fine_width, u
     }
 }
 
-// Fills the first level. Values below 0, which filters of other programs leave, become 0.
+// Fills the first level.
 static void level_fill(Texel *texels, const Image *image, bool decodes)
 {
     size_t count = (size_t)image->width * image->height;
     for (size_t i = 0; i < count; i++) {
         float color[3];
-        for (size_t channel = 0; channel < 3; channel++) {
-            float value = image->values[i * image->channels + (image->channels < 3 ? 0 : channel)];
-            color[channel] = decodes ? (float)srgb_decode((double)value) : fmaxf(value, 0);
-        }
+        image_light(image, i, decodes, color);
         texel_set(&texels[i], color);
         if (image->alpha) memcpy(&texels[i].color.w, &image->alpha[i], sizeof image->alpha[i]);
     }

@@ -61,13 +61,9 @@ static Color blended_color(const Scene *scene, double sine)
 
 static Color texel_color(const Image *image, uint32_t x, uint32_t y)
 {
-    const float *values = image->values + ((size_t)y * image->width + x) * image->channels;
-    double color[3];
-    for (size_t channel = 0; channel < 3; channel++) {
-        const double value = (double)values[image->channels < 3 ? 0 : channel];
-        color[channel] = image->display ? (double)(float)srgb_decode(value) : fmax(value, 0);
-    }
-    return (Color){color[0], color[1], color[2]};
+    float color[3];
+    image_light(image, (size_t)y * image->width + x, image->display, color);
+    return (Color){(double)color[0], (double)color[1], (double)color[2]};
 }
 
 Color sky_mean(const Scene *scene)
