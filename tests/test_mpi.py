@@ -218,9 +218,13 @@ class Mpi(TestCase):
             self.check_frames(all)
 
     def test_options_for_one_process(self):
+        """They are refused before any frame is rendered."""
+        write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
         for option in "--work-group 2x2", "--build-options=-DUNUSED", "--capture launches":
-            process = self.mpirun(f"-n 2 {RANKS} {RENDER} {option}", status=1)
-            self.assertIn("--work-group, --build-options and --capture need glint render, a single process", process.stderr)
+            for command in RENDER, "render moving.yaml --size 64x48 --frames 0-2 -o frame%d.png":
+                process = self.mpirun(f"-n 2 {RANKS} {command} {option}", status=1)
+                self.assertIn("--work-group, --build-options and --capture need glint render, a single process", process.stderr)
+            self.assertEqual(list(Path().glob("frame*")), [])
 
     def test_a_refused_checkpoint(self):
         """A refused checkpoint ends all ranks."""

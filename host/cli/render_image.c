@@ -319,12 +319,6 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     const double start = clock_seconds();
     int status = EXIT_USER;
     options.output.path = path;
-    if (ranks &&
-        (common->driver.work_group[0] > 0 || common->driver.build_options || common->driver.capture_folder)) {
-        option_usage_fault("render",
-                           "--work-group, --build-options and --capture need glint render, a single process");
-        return EXIT_USER;
-    }
     Stage *stage = options.timing == TIMING_TRACE ? stage_open(true) : NULL;
     options.common.scene.stage = options.common.settings.stage = stage;
     MessageList printed = {0};

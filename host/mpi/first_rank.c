@@ -228,6 +228,14 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
     free(states);
 }
 
+// Returns false with a message if an option is for a single process.
+static bool options_suit_ranks(const DriverOptions *options)
+{
+    return (options->work_group[0] == 0 && !options->build_options && !options->capture_folder) ||
+           option_usage_fault(
+               "render", "--work-group, --build-options and --capture need glint render, a single process");
+}
+
 int first_rank_run(size_t other_count, int argument_count, char **arguments)
 {
     Ranks ranks = {.remote = {.count = other_count,
@@ -251,7 +259,9 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {
             command->open.is_single = true;
-            if (render_command_check_overwrites(command)) {
+            if (!options_suit_ranks(&command->options.common.driver)) {
+                render_command_record(command, EXIT_USER);
+            } else if (render_command_check_overwrites(command)) {
                 const size_t dealt = frames_deal(command, other_count, argument_count, arguments);
                 render_command_run_from(command, dealt, &ranks);
             }
