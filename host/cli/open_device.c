@@ -28,6 +28,7 @@ const Device *device_choose_numbered(const DeviceList *devices, const char *sele
     const char *listed = device_selector(selector);
     const Device **chosen;
     const Device *first = listed ? NULL : device_choose(devices, NULL, messages);
+    if (!listed && !first) return NULL;
     const size_t count = devices_choose(devices, listed ? listed : "all", &chosen, messages);
     size_t kept = 0;
     for (size_t i = 0; i < count; i++)
