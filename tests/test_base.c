@@ -1,11 +1,13 @@
-// Tests messages with their place, growing text, similar words, stages and hashes.
+// Tests messages with their place, growing text, similar words, stages, hashes and file names.
 #include "host/base/base64.h"
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
+#include "host/base/file.h"
 #include "host/base/hash.h"
 #include "host/base/stage.h"
 #include "tests/check.h"
 #include "tests/child.h"
+#include "tests/owned.h"
 
 static char *printed(const MessageList *messages)
 {
@@ -213,6 +215,16 @@ static void stage_check(Stage *stage, const char *expected)
     assert_int_equal(stage_write(stage, &text, &seconds), expected[0] != '\0');
     assert_string_equal(text_c(&text), expected);
     if (expected[0]) assert_true(seconds >= 0);
+}
+
+TEST(stems_of_files)
+{
+    static const char *const rows[][2] = {
+        {"a/b.c/scene.v2.yaml", "scene.v2"}, {"a.d/scene", "scene"}, {".yaml", ".yaml"}, {"-", "image"}};
+    for (size_t i = 0; i < COUNT_OF(rows); i++) {
+        OWNED char *stem = file_stem(rows[i][0]);
+        assert_string_equal(stem, rows[i][1]);
+    }
 }
 
 TEST(stages)

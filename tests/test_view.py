@@ -216,6 +216,7 @@ class View(TestCase):
         with open("scene.yaml", encoding="utf-8") as scene:
             window = Window(self, "-", stdin=scene)
         window.shows_at_last(self.image_of(SCENE))
+        self.assertEqual(window.saved(), "image-1.png")
         window.close()
 
     def test_changes_during_a_write(self):

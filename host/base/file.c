@@ -40,6 +40,12 @@ const char *file_base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
+char *file_stem(const char *path)
+{
+    const char *name = strcmp(path, "-") == 0 ? "image" : file_base_name(path), *dot = strrchr(name, '.');
+    return memory_copy_part(name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
+}
+
 int file_folder_open(const char *path)
 {
     const char *slash = strrchr(path, '/');

@@ -24,6 +24,8 @@ FileId file_id(const char *path);
 bool file_is_same(FileId a, FileId b);
 // Returns the part of a path after its last slash.
 const char *file_base_name(const char *path);
+// Returns the base name without its ending, or "image" for "-", standard input. The caller frees it.
+char *file_stem(const char *path);
 // Opens the folder of a file. A folder that may be written but not listed is opened, but cannot be synced.
 // Returns -1 and sets errno on failure.
 int file_folder_open(const char *path);

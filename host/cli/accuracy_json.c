@@ -5,7 +5,7 @@
 #include "host/base/file.h"
 #include <inttypes.h>
 #include <math.h>
-#include <string.h>
+#include <stdlib.h>
 
 const ResultTable accuracy_table = {
     .command = "accuracy",
@@ -28,9 +28,9 @@ static const char is_reference[] = "it is the reference that the others are comp
 Text accuracy_saved_prefix(const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
 {
     Text text = {0};
-    const char *name = file_base_name(report->scenes[scene].path), *dot = strrchr(name, '.');
-    size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
-    text_appendf(&text, "%s/%zu-%.*s", report->folder, scene, (int)length, name);
+    char *stem = file_stem(report->scenes[scene].path);
+    text_appendf(&text, "%s/%zu-%s", report->folder, scene, stem);
+    free(stem);
     if (variant)
         text_appendf(&text, "-%s-%u-%s-%u", variant->row->key.precision, variant->row->key.lanes,
                      variant->row->key.bvh, variant->samples);

@@ -10,12 +10,9 @@
 
 char *image_output_default_path(const char *scene_path)
 {
-    const char *name = strcmp(scene_path, "-") == 0 ? "image" : file_base_name(scene_path);
-    const char *dot = strrchr(name, '.');
-    Text path = {0};
-    text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
-    text_appendf(&path, ".png");
-    return path.items;
+    char *stem = file_stem(scene_path), *path = text_format("%s.png", stem);
+    free(stem);
+    return path;
 }
 
 bool image_output_is_stdout(const char *path)

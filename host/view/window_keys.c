@@ -1,10 +1,10 @@
 // Handles the keys.
 #include "host/view/window_state.h"
 
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/view/camera_yaml.h"
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -74,17 +74,17 @@ static void save_ask(Window *window, const char *ending)
         message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
         return;
     }
-    const char *name = scene_name(window), *dot = strrchr(name, '.');
-    Text path = {0};
+    char *stem = file_stem(window->options->frames.scene_path), *path = NULL;
     int number = 0;
     do {
-        text_free(&path);
-        text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
-    } while (access(text_c(&path), F_OK) == 0);
+        free(path);
+        path = text_format("%s-%d.%s", stem, ++number, ending);
+    } while (access(path, F_OK) == 0);
+    free(stem);
     window->play.is_running = false;
     request_send(window); // so that the newest request's image is saved
-    frame_loop_save(window->frames, text_c(&path));
-    text_free(&path);
+    frame_loop_save(window->frames, path);
+    free(path);
 }
 
 static void facts_toggle(Window *window)
