@@ -197,26 +197,27 @@ static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, con
 static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn,
                         bool is_recorded)
 {
-    static const char *const names[] = {"position", "look_at", "up"};
-    const Vector3 before[] = {old->position, old->look_at, old->up},
-                  after[] = {camera->position, camera->look_at, camera->up};
-    bool is_moved = false;
-    for (size_t i = 0; i < COUNT_OF(names); i++)
-        is_moved |= !vectors_equal(before[i], after[i]);
-    for (size_t i = 0; i < COUNT_OF(names); i++) {
-        if (strcmp(key, names[i]) != 0) continue;
-        const bool had_turn = i == 0 && is_moved && has_turn;
-        if (!is_recorded && !had_turn && vectors_equal(before[i], after[i])) return false;
-        vector_write_yaml(text, after[i]);
-        return true;
-    }
-    if (is_moved && strcmp(key, "turn") == 0) {
-        number_write_yaml(text, 0);
-        return true;
-    }
-    if (strcmp(key, "height") != 0 || (!is_recorded && old->half_tangent == camera->half_tangent))
-        return false;
-    number_write_yaml(text, 2 * camera->half_tangent);
+    const bool has_position = !vectors_equal(old->position, camera->position),
+               has_target = !vectors_equal(old->look_at, camera->look_at),
+               has_up = !vectors_equal(old->up, camera->up), is_moved = has_position || has_target || has_up;
+    const struct {
+        const char *key;
+        bool has_changed;
+        const Vector3 *vector; // NULL for a number
+        double number;
+    } values[] = {{"position", has_position || (is_moved && has_turn), &camera->position, 0},
+                  {"look_at", has_target, &camera->look_at, 0},
+                  {"up", has_up, &camera->up, 0},
+                  {"turn", is_moved, NULL, 0},
+                  {"height", old->half_tangent != camera->half_tangent, NULL, 2 * camera->half_tangent}};
+    size_t i = 0;
+    while (i < COUNT_OF(values) && strcmp(key, values[i].key) != 0)
+        i++;
+    if (i == COUNT_OF(values) || !(is_recorded || values[i].has_changed)) return false;
+    if (values[i].vector)
+        vector_write_yaml(text, *values[i].vector);
+    else
+        number_write_yaml(text, values[i].number);
     return true;
 }
 
