@@ -221,7 +221,7 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
             is_busy |= rank_answer(&states[i], scheduler, first_worker + i, (int)i + 1);
             done_count += states[i].is_done && states[i].end_sent;
         }
-        if (!is_busy) rest();
+        if (!is_busy) poll_pause();
     }
     for (size_t i = 0; i < ranks->remote.count; i++)
         film_free(&states[i].band);

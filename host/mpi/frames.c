@@ -161,7 +161,7 @@ static void *own_frames_render(void *context)
     for (bool works = true; works && !deal_is_over(deal);) {
         const size_t frame = frame_acquire(deal);
         if (frame == NO_FRAME) {
-            rest();
+            poll_pause();
             continue;
         }
         works = frame_record(deal, frame, frame_render(deal->command, frame));
@@ -216,7 +216,7 @@ static void frames_serve(Deal *deal, size_t other_count)
             is_busy |= frame_send(deal, &states[i], (int)i + 1);
             over_count += states[i].is_over;
         }
-        if (!is_busy) rest();
+        if (!is_busy) poll_pause();
     }
     free(states);
 }

@@ -3,7 +3,7 @@
 #include "host/base/memory.h"
 #include <time.h>
 
-void rest(void)
+void poll_pause(void)
 {
     nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
 }
@@ -44,7 +44,7 @@ void receive_bytes(void *bytes, size_t size, int rank, int tag)
         const int count = message_size(size);
         MPI_Status status;
         while (!has_message(rank, tag, &status))
-            rest();
+            poll_pause();
         MPI_Recv(bytes, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
         size -= (size_t)count;
         if (size == 0) return;

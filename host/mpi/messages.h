@@ -56,7 +56,7 @@ typedef struct {
 } Order;
 
 // Sleeps briefly. MPI waits by polling, and this leaves the processor to the device.
-void rest(void);
+void poll_pause(void);
 
 // Returns the size of the next message of a sequence that sends `bytes_left` more bytes. MPI counts the bytes
 // of a message by an int.
