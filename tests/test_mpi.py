@@ -198,6 +198,20 @@ class Mpi(TestCase):
         reports = [json.loads(line) for line in process.stdout.splitlines()]
         self.assertEqual([(report["frame"], len(report["by_rank"])) for report in reports], [(frame, 1) for frame in range(5)])
 
+    def test_frames_of_another_camera(self):
+        """All ranks share each frame if one sees another file of --camera."""
+        write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
+        os.mkdir("other")
+        for path, x in ("camera.yaml", 0), ("other/camera.yaml", 1):
+            write(path, f"camera: {{position: [{x}, 0, -6], look_at: [0, 0, 0]}}\nobjects: []\n")
+        here = Path.cwd()
+        command = f"render {here}/moving.yaml --camera camera.yaml --size 64x48 --precision strict --frames 0-3"
+        self.glint(f"{command} --quiet -o one%d.npy", env=POCL)
+        ranks = f"{RANKS} {command} -o {here}/ranks%d.npy"
+        self.mpirun_each(ranks, f"env -C other {ranks}")
+        for frame in range(4):
+            self.assertSameBytes(f"one{frame}.npy", f"ranks{frame}.npy")
+
     def test_motion_blur(self):
         """Motion is blurred in a frame that one rank renders and in one that all render."""
         write("moving.yaml", "shutter: 0.5\n" + SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))

@@ -35,23 +35,30 @@ typedef struct {
     char **arguments;
 } Call;
 
-// Returns a hash of the arguments, the scenes' files and the images' names, which is the same for two ranks
-// only if both render the same and see the same files.
+// Adds what identifies a file and its content to a hash.
+static uint64_t file_hash_add(uint64_t hash, const char *path)
+{
+    struct stat file = {0};
+    if (stat(path, &file) != 0) file.st_size = -1;
+    const uint64_t facts[] = {file.st_ino, (uint64_t)file.st_size, (uint64_t)file.st_mtim.tv_sec,
+                              (uint64_t)file.st_mtim.tv_nsec};
+    return hash_bytes(hash, facts, sizeof facts);
+}
+
+// Returns a hash of the arguments, the images' names and the files of the scenes and of the camera. It is the
+// same for two ranks only if both render the same and see the same of these files. Files that these name,
+// such as meshes, are not compared.
 static uint64_t files_hash(const RenderCommand *command, Call call)
 {
     uint64_t hash = HASH_START;
     for (int i = 2; i < call.argument_count; i++)
         hash = hash_bytes(hash, call.arguments[i], strlen(call.arguments[i]) + 1);
     for (size_t i = 0; i < command->count; i++) {
-        const char *scene = render_command_scene(command, i), *path = command->paths[i];
-        struct stat file = {0};
-        if (stat(scene, &file) != 0) file.st_size = -1;
-        const uint64_t facts[] = {file.st_ino, (uint64_t)file.st_size, (uint64_t)file.st_mtim.tv_sec,
-                                  (uint64_t)file.st_mtim.tv_nsec};
-        hash = hash_bytes(hash, path, strlen(path) + 1);
-        hash = hash_bytes(hash, facts, sizeof facts);
+        hash = hash_bytes(hash, command->paths[i], strlen(command->paths[i]) + 1);
+        hash = file_hash_add(hash, render_command_scene(command, i));
     }
-    return hash;
+    const char *camera = command->options.common.scene.camera;
+    return camera ? file_hash_add(hash, camera) : hash;
 }
 
 // Returns whether standard streams are used, which only one rank can read, or write in order.
