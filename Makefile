@@ -1,11 +1,11 @@
-# make [BUILD=folder] [WERROR=1]: CC, CPPFLAGS, CFLAGS, LDFLAGS and PKG_CONFIG belong to the user, and a variant is another
-# BUILD folder. One whose name ends in -sanitize is built with ASan and UBSan, at -O1, which takes half the time. The debug
-# information has line numbers alone, which saves a sixth of a build's time.
+# make [BUILD=folder] [WERROR=1]: CC, CPPFLAGS, CFLAGS, LDFLAGS and PKG_CONFIG belong to the user, and each variant has
+# another BUILD folder. If its name ends in -sanitize, everything is compiled with ASan and UBSan, at -O1, which takes half
+# the time. The debug information has only line numbers, which saves a sixth of a build's time.
 VERSION := 0.2.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
-# The tests' own objects are built alike in every folder.
+# The tests' objects have the same flags in every folder.
 ifeq ($(origin CFLAGS),undefined)
 CFLAGS := $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g1
 $(BUILD)/tests/%.o: private CFLAGS := -O1 -g1
@@ -20,7 +20,7 @@ $(error Libraries are missing; tools/setup installs or lists them)
 endif
 endif
 
-# Of the window; without them glint is built without one.
+# The window's libraries. glint is built without a window if they are missing.
 window_packages := sdl2 SDL2_ttf fontconfig
 has_window      := $(shell $(PKG_CONFIG) --exists $(window_packages) && echo 1)
 window_flags    := $(if $(has_window),$(shell $(PKG_CONFIG) --cflags $(window_packages)))
@@ -30,13 +30,13 @@ sanitize := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-fra
 endif
 # Keeps the source's folder and BUILD out of the output.
 reproducible := -ffile-prefix-map=$(CURDIR)=. -ffile-prefix-map=$(abspath $(BUILD))/=build/
-# A scene has the same flat arrays, and so the same image, whatever the host's processor. Therefore a * b + c is rounded
-# twice even where an instruction rounds it once, which clang would use by default, on arm64 without any option. 32-bit
-# x86 calculates in SSE registers, because x87's round to 64 bits.
+# A scene has the same flat arrays, and so the same image, on all processors. Therefore a * b + c is rounded twice. By
+# default clang uses an instruction that rounds it once, on arm64 without any option. 32-bit x86 computes in SSE
+# registers, because x87's round to 64 bits.
 has_macro   = $(shell $(CC) $(CFLAGS) -dM -E -x c /dev/null | grep -w $1)
 arithmetic := -ffp-contract=off $(if $(call has_macro,__i386__),-msse2 -mfpmath=sse)
 large_files := $(if $(call has_macro,__LP64__),,-D_FILE_OFFSET_BITS=64 -D_TIME_BITS=64)
-# Newer compilers warn of named constants, which are enums, in floating-point arithmetic, and of OpenEXR's own initializers.
+# Newer compilers warn of named constants, which are enums, in floating-point arithmetic, and of OpenEXR's initializers.
 fine     := -Wno-enum-float-conversion -Wno-missing-field-initializers
 comma    := ,
 OURS     := -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden $(large_files) $(arithmetic) -I. \
@@ -44,13 +44,13 @@ OURS     := -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden $(large_files) $(ar
             $(fine) $(if $(filter 1,$(WERROR)),-Werror) \
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
             -DHAS_WINDOW=$(or $(has_window),0) $(sanitize) $(reproducible)
-# Of OpenEXR only the library with the C interface.
+# Links only OpenEXR's C library.
 LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson zlib libpng libturbojpeg libexif assimp libsodium OpenCL) \
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail
-# In a clone what git describe prints, such as 0.2.0-3-g5d2aaa6; elsewhere, or without tags, VERSION. git archive writes the
-# commit into version.c.
+# The version is what git describe prints, such as 0.2.0-3-g5d2aaa6. Outside of a clone, or without tags, it is VERSION.
+# git archive writes the commit into version.c.
 GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe --tags --match 'v[0-9]*' --dirty \
                  2>/dev/null))),$(VERSION))
 GLINT_COMMIT  := $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null))
@@ -101,7 +101,7 @@ $(shared_library): $(library_objects) host/api/symbols
 $(BUILD)/libglint.so: $(shared_library)
 	ln -sf $(<F) $@
 
-# One object, in which all other symbols are local.
+# The archive holds one object, in which only the symbols of glint.h are global.
 $(BUILD)/libglint.a: $(library_objects) host/api/symbols
 	$(LD) -r $(library_objects) -o $(BUILD)/libglint.o
 	sed -n 's/^    \(glint_[a-z_]*\);/\1/p' host/api/symbols > $(BUILD)/symbols
@@ -109,12 +109,12 @@ $(BUILD)/libglint.a: $(library_objects) host/api/symbols
 	rm -f $@
 	$(AR) rcs $@ $(BUILD)/libglint.o
 
-# What glint view starts.
+# glint view starts this program.
 $(BUILD)/glint-view: private LIBS += $(shell $(PKG_CONFIG) --libs $(window_packages))
 $(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
 	$(LINK)
 
-# glint render on the devices of an MPI job; needs libopenmpi-dev.
+# Builds glint-mpi, which renders on the devices of an MPI job. Needs libopenmpi-dev.
 mpi_flags := $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags ompi-c 2>/dev/null))
 
 mpi: $(BUILD)/glint-mpi
@@ -131,7 +131,7 @@ $(BUILD)/all_shapes.h: $(shapes) kernels/shapes
 	@mkdir -p $(@D)
 	printf '#include "%s"\n' $(shapes:kernels/%=%) > $@
 
-# With the formulas of tools/numerics/textbook.h.
+# TEXTBOOK=1 replaces the shapes' formulas by those of tools/numerics/textbook.h.
 $(BUILD)/primitives.h: kernels/traversal/primitives.h tools/numerics/textbook.h
 	@mkdir -p $(@D)
 	sed -e '/^#include "traversal\/cutout.h"/r tools/numerics/textbook.h' -e 's/\bname##_hit(/textbook_##name##_hit(/' $< > $@
@@ -155,7 +155,7 @@ $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
-# Each test links only the objects that it uses, by gold where it is installed; each of the two halves the time.
+# Each test links only the objects that it uses, with gold if it is installed. Both halve the time.
 test_linker := $(if $(shell $(CC) -fuse-ld=gold -Wl,--version 2>/dev/null),-fuse-ld=gold)
 
 $(BUILD)/tests.a: $(library)
@@ -165,7 +165,7 @@ $(BUILD)/tests.a: $(library)
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(BUILD)/tests.a
 	$(CC) $(OURS) $(CFLAGS) $(test_linker) $(LDFLAGS) $(filter %.o,$^) $(BUILD)/tests.a -lcmocka $(LIBS) -o $@
 
-# Tests in which calls fail: those of OpenCL, and of the system's two, go through tests/failing.
+# In these tests OpenCL's calls and some of the system's go through tests/failing, which makes them fail.
 opencl_calls    := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
 failing         := $(wildcard tests/failing/*.c)
 failing_objects := $(failing:%.c=$(BUILD)/%.o)
@@ -177,22 +177,23 @@ $(failing_tests): $(failing_objects)
 
 $(BUILD)/tests/test_readers: $(BUILD)/tests/fuzz/readers.o
 
-# The paces of its workers are exact.
+# test_scheduler replaces the clock, so that its workers' speeds are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds
 
-# An allocation fails.
+# test_bench makes an allocation fail.
 $(BUILD)/tests/test_bench: private LDFLAGS += -Wl,--wrap=malloc
 
-# A file is removed before it is locked, or cannot be removed.
+# test_checkpoint removes a file before it is locked, and makes a removal fail.
 $(BUILD)/tests/test_checkpoint: private LDFLAGS += -Wl,--wrap=flock -Wl,--wrap=unlink
 
-# An image is wrong, or is that of another scene.
+# test_certify_status renders wrong colors, or another scene.
 $(BUILD)/tests/test_certify_status: private LDFLAGS += -Wl,--wrap=renderer_render_film -Wl,--wrap=renderer_open
 
-# Every reader under libFuzzer, for tools/fuzz: make fuzz builds $(BUILD)-fuzz/fuzz with Debian's newest clang.
+# make fuzz builds $(BUILD)-fuzz/fuzz for tools/fuzz, which runs every reader under libFuzzer, with Debian's newest clang.
 CLANG ?= $(or $(lastword $(sort $(wildcard /usr/bin/clang-[1-9][0-9]))),clang)
 fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
-                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c render/film.c) \
+                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c \
+                render/film.c) \
                 tests/fuzz/readers.c
 fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
@@ -200,7 +201,7 @@ fuzz:
 	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O2 -g' \
 	    sanitize='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all -D__SANITIZE_ADDRESS__' $(BUILD)-fuzz/fuzz
 
-# What guides it is the readers' coverage: messages and texts would take half of the time.
+# Only the readers' coverage guides the fuzzer, because that of messages and texts would take half the time.
 ifneq ($(filter %-fuzz,$(BUILD)),)
 $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/base/*.c) tests/fuzz/readers.c): private OURS += -fno-sanitize=fuzzer-no-link
 endif
@@ -216,7 +217,7 @@ $(library_clients:%=$(BUILD)/tools/%): %: %.o $(library)
 
 $(BUILD)/tools/numerics/ladder: $(BUILD)/tests/random_ray.o
 
-# These two change only when what they hold does, and what depends on it is then built anew.
+# Each of these files is rewritten only if its content changes, and its dependents are then rebuilt.
 $(BUILD)/flags: text := $(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(TEXTBOOK)
 $(BUILD)/version: text := $(GLINT_VERSION) $(GLINT_COMMIT)
 $(BUILD)/flags $(BUILD)/version: FORCE
@@ -228,7 +229,7 @@ tests: $(tests) kernel_text library
 test:
 	+@tools/run_tests $(BUILD)
 
-# For the comparison with other programs alone; needs libembree-dev.
+# A renderer on Embree, only for the comparison with other programs. Needs libembree-dev.
 embree_sources := $(wildcard tools/peers/embree/*.c)
 embree_headers := $(wildcard tools/peers/embree/*.h)
 
@@ -236,8 +237,8 @@ $(BUILD)/peers/embree: $(embree_sources) $(embree_headers) $(BUILD)/tests.a Make
 	@mkdir -p $(@D)
 	$(CC) $(OURS) -O3 -march=native -mprefer-vector-width=512 -ffast-math -fopenmp $(filter %.c %.a,$^) -lembree3 $(LIBS) -o $@
 
-# make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files]: times beside those of the other programs that are
-# installed (docs/performance.md), five minutes of a machine that does nothing else.
+# make bench-peers [ROUNDS=3] [RUNGS=…] [SPD=folder of .nff files] compares times with those of the other programs that
+# are installed (docs/performance.md). It takes five minutes of an idle machine.
 ROUNDS        ?= 3
 RUNGS         ?= spheres-16 spheres-10000 bunny-20000 bunny-1000000
 SPD           ?=
@@ -256,22 +257,24 @@ bench-peers: $(peers_programs) $(peers_python)
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
 	tools/report docs/measurements/README.md
 
-# How times grow with the number of triangles and of spheres, up to ten million: half an hour, 10 GB of memory and of disk.
+# Measures how times grow with the number of triangles and of spheres, up to ten million. It takes half an hour and
+# 10 GB of memory and of disk.
 bench-growth: $(peers_programs) $(peers_python)
 	$(peers_python) tools/peers/growth $(peers_options)
 
-# With PyYAML: Debian's, if it is there.
+# Uses Debian's PyYAML if it is installed.
 $(peers_python):
 	python3 -m venv --system-site-packages $(BUILD)/peers/python
 	$@ -c 'import yaml' 2>/dev/null || $@ -m pip install -q PyYAML==6.0.3
 
-# clang-format is pinned to one release, because each formats differently.
+# One release of clang-format is required, because each formats differently.
 CLANG_FORMAT ?= clang-format-14
 CLANG_TIDY   ?= clang-tidy
 CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 LINT_FAST    ?= # 1 omits clang's static analyzer and cppcheck, which take most of the time
-linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/measure/features.c tools/kernels/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
+linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/measure/features.c tools/kernels/kernel_text.c \
+          tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
           $(if $(has_embree),$(embree_sources)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/*.h host/*/*.h host/*/*/*.h tests/*.h \
@@ -295,7 +298,7 @@ lint-tidy:
 	    '$(CLANG_TIDY) --quiet $(if $(filter 1,$(LINT_FAST)),--checks=-clang-analyzer-*) "$${@:$$1+2}" -- "$${@:2:$$1}" \
 	    2> >(grep -v "warnings\? generated" >&2)' bash $(words $(tidy_flags)) $(tidy_flags)
 
-# It takes the first argument of cmocka's assert_int_equal(fclose(file), 0) to be used once more.
+# cppcheck assumes that cmocka's assert_int_equal(fclose(file), 0) uses its first argument twice.
 lint-cppcheck:
 	@$(CPPCHECK) --quiet --std=c11 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 --suppress=deallocuse:tests/\* \
 	    -j $(LINT_JOBS) -I. -D_GNU_SOURCE $(version_flags) $(linted)
@@ -303,7 +306,7 @@ lint-cppcheck:
 lint-man:
 	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
 
-# What is free of the wording that tools/lint-words finds.
+# These files have none of the wording that tools/lint-words finds.
 worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
           $(foreach room,base cli compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
           $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h) \
@@ -313,7 +316,7 @@ worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
 lint-words:
 	@tools/lint-words $(worded)
 
-# The measured parts of the documents; the machine should have nothing else to do.
+# Measures what the documents report. The machine should be idle.
 accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
 measured        := accuracy bench-lanes verify
 
@@ -346,7 +349,8 @@ installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(progra
     tools/completions/glint.zsh:$(ZSHDIR)/_glint \
     tools/completions/glint.fish:$(FISHDIR)/glint.fish \
     $(foreach file,$(wildcard scenes/*.* scenes/*/*),$(file):$(DATADIR)/glint/$(file)) \
-    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE docs/measurements/README.md $(wildcard docs/*.md docs/ci/* docs/*.schema.json docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
+    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE docs/measurements/README.md \
+        $(wildcard docs/*.md docs/ci/* docs/*.schema.json docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
     $(if $(filter glint-view,$1),$(BUILD)/glint-view.desktop:$(DATADIR)/applications/glint-view.desktop \
         tools/desktop/glint-view.svg:$(DATADIR)/icons/hicolor/scalable/apps/glint-view.svg \
         tools/desktop/glint-view.metainfo.xml:$(DATADIR)/metainfo/alt.glint.glint_view.metainfo.xml)
@@ -359,7 +363,7 @@ install: all
 	    install -D -m 644 $${pair%%:*} $(DESTDIR)$${pair#*:} || exit; \
 	done
 
-# libglint for C programs.
+# Installs libglint for C programs.
 install-library: library
 	install -D -m 644 $(shared_library) $(DESTDIR)$(LIBDIR)/$(notdir $(shared_library))
 	ln -sf $(notdir $(shared_library)) $(DESTDIR)$(LIBDIR)/libglint.so
@@ -370,7 +374,8 @@ install-library: library
 	install -D -m 644 host/api/glint.h $(DESTDIR)$(INCLUDEDIR)/glint.h
 	install -D -m 644 docs/example.c $(DESTDIR)$(DOCDIR)/docs/example.c
 
-# A wheel of the Python package with all libraries that it needs, for pip install; auditwheel names the systems that it suits.
+# Builds a wheel of the Python package for pip install, with all libraries that it needs. auditwheel names the systems that it
+# suits.
 wheel: $(shared_library)
 	rm -rf $(BUILD)/wheel
 	mkdir -p $(BUILD)/wheel
@@ -382,18 +387,21 @@ wheel: $(shared_library)
 	PATH=$(abspath $(BUILD))/wheel/venv/bin:$$PATH && cd $(BUILD)/wheel/source && \
 	    pip wheel -q --no-deps --no-build-isolation -w ../bare . && auditwheel repair -w .. ../bare/*.whl
 
-# Leaves other files, and the folders that other programs use.
+# Removes only what make install installs, and folders that are then empty.
 uninstall: every := glint glint-view glint-mpi
 uninstall:
-	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))
-	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs/measurements /docs/ci /docs /); do \
+	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) \
+	    $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))
+	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) \
+	    $(addprefix $(DESTDIR)$(DOCDIR),/docs/measurements /docs/ci /docs /); do \
 	    [ ! -d $$folder ] || rmdir --ignore-fail-on-non-empty $$folder || exit; \
 	done
 
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all mpi fuzz tests test $(notdir $(library_clients)) bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man lint-words docs-measurements library wheel install install-library uninstall clean FORCE
+.PHONY: all mpi fuzz tests test $(notdir $(library_clients)) bench-peers bench-growth format lint lint-format lint-tidy \
+    lint-cppcheck lint-man lint-words docs-measurements library wheel install install-library uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(foreach folder,* */* */*/*,$(BUILD)/$(folder)/*.d))
