@@ -307,8 +307,8 @@ lint-man:
 	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
 
 # These files have none of the wording that tools/lint-words finds.
-worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
-          $(foreach room,base cli compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
+worded := Makefile .ci/run $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
+          host/*.c host/*/*.[ch] host/*/*/*.[ch] host/cli/page/*.js host/cli/page/*.css host/python/glint/*.py tools/completions/*) \
           $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h) \
           $(filter-out tests/lint_words.sh,$(wildcard $(foreach folder,tests tests/*,$(folder)/*.[ch] $(folder)/*.py $(folder)/*.sh)) tests/support.bash) \
           $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/kernels/* tools/measure/* tools/numerics/* tools/peers/* tools/peers/embree/*))

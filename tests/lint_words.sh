@@ -33,8 +33,8 @@ int mend; // the article
 fail("a ray meets %d shapes", "beside");
 END
 found source.c '1 3 4 6 8'
-printf '#!/usr/bin/env python3\n"""Renders anew."""\nbeside = "anew"  # goes on\n' >"$scratch/tool.py"
-found tool.py '2 3'
+printf '#!/usr/bin/env python3\n"""Renders anew."""\nbeside = "anew"  # goes on\nprint(f"beside\\n", f"is {1} beside\\n")\n' >"$scratch/tool.py"
+found tool.py '2 3 4'
 printf '#!/bin/sh\necho anew "$#" # beside\n' >"$scratch/tool"
 found tool 2
 printf '.TH GLINT 1\n.B anew\ngoes on\n' >"$scratch/page.1"

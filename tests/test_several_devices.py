@@ -102,7 +102,7 @@ class SeveralDevices(TestCase):
             for device in report["by_device"]:
                 self.assertLessEqual(device["bands"], sum(launch["name"] == "aov" for launch in device["launches"]))
 
-    @unittest.skipIf(IS_SANITIZED, "sanitizers have handlers of their own")
+    @unittest.skipIf(IS_SANITIZED, "sanitizers have separate handlers")
     @unittest.skipUnless(platform.machine() == "x86_64" and sys.maxsize > 2**32, "tools/chaos.c is for x86-64 only")
     def test_failing_calls(self):
         """If any OpenCL call of either device fails, the image is right, or there is an error and none."""

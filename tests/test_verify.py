@@ -197,7 +197,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertEqual(pixels(f"{first} --lanes 1"), expected)
         self.assertNotEqual(pixels(other), expected)
 
-    @unittest.skipUnless(IS_LONG, "verify traces rays, too")
+    @unittest.skipUnless(IS_LONG, "verify also traces rays")
     def test_traced_rays(self):
         write("rays", "0.3 0.4 -9 0 0.01 1\n-5 1 0 1 0 0.02\n1 9 -2 0.01 -1 0\n")
         scene = self.scene()

@@ -178,7 +178,7 @@ class Runner:
         """Runs the command again without a failure and checks that it succeeds."""
         status, errors = self.finish(self.start(command.line))
         if status != command.status or errors:
-            self.violated(f"does not go on: exit status {status}", command.line, cause, errors)
+            self.violated(f"does not recover: exit status {status}", command.line, cause, errors)
         return status, errors
 
     def learn(self, command):

@@ -113,7 +113,7 @@ class Device:
         return group
 
     def run(self, launch, text, item=None, extra=()):
-        """Runs the launch with the text instead of its own, for all work-items or for the work-group of one.
+        """Runs the launch with another text, for all work-items or for the work-group of one.
 
         extra: arguments that follow those of the launch, arrays for buffers and scalars of NumPy for values. Returns the film and the
         buffers among `extra`, as arrays of uint32.
