@@ -81,7 +81,7 @@ typedef struct {
     mask found;
 } TextbookNearest;
 
-static inline void textbook_nearest_take(TextbookNearest *nearest, const Ray *ray, real t, mask counts)
+static inline void textbook_nearest_update(TextbookNearest *nearest, const Ray *ray, real t, mask counts)
 {
     mask closer = counts & (t > ray->tmin) & (!nearest->found | (t < nearest->t));
     nearest->t = lanes_select(closer, t, nearest->t);
@@ -124,8 +124,8 @@ static inline mask textbook_revolution_hit(const Revolution *shape, bool sloped,
         far_counts = hit & (far_height >= (real)(0)) & (far_height <= body.height);
     }
     if (!(shape->id.y & IGNORES_FRONT_FACES) || capped)
-        textbook_nearest_take(&nearest, ray, roots.near, near_valid);
-    textbook_nearest_take(&nearest, ray, roots.far, far_counts);
+        textbook_nearest_update(&nearest, ray, roots.near, near_valid);
+    textbook_nearest_update(&nearest, ray, roots.far, far_counts);
     if (capped) {
         for (uint end = 0; end < 2; end++) {
             real height = end ? body.height : (real)(0);
@@ -133,8 +133,8 @@ static inline mask textbook_revolution_hit(const Revolution *shape, bool sloped,
             real to_end = (height - start) / rise;
             Vector p = vector_fma(ray->direction, to_end, f);
             real squared = vector_dot(p, p) - height * height;
-            textbook_nearest_take(&nearest, ray, to_end,
-                                  RAY_ACTIVE(ray) & (squared <= end_radius * end_radius));
+            textbook_nearest_update(&nearest, ray, to_end,
+                                    RAY_ACTIVE(ray) & (squared <= end_radius * end_radius));
         }
     }
     *t = nearest.t;
@@ -178,15 +178,15 @@ static inline real textbook_cubic_root(real a, real b, real c)
 }
 
 // Pushes the real roots of y^2 + b y + c, plus `shift`.
-static inline void textbook_quadratic_offer(real b, real c, real shift, mask counts, const Ray *ray,
-                                            TextbookNearest *nearest)
+static inline void textbook_quadratic_push(real b, real c, real shift, mask counts, const Ray *ray,
+                                           TextbookNearest *nearest)
 {
     real half_b = (real)(0.5f) * b;
     real discriminant = half_b * half_b - c;
     TextbookRoots roots = textbook_quadratic_roots((real)(1), half_b, real_max(discriminant, (real)(0)));
     mask real_roots = counts & (discriminant >= (real)(0));
-    textbook_nearest_take(nearest, ray, roots.near - shift, real_roots);
-    textbook_nearest_take(nearest, ray, roots.far - shift, real_roots);
+    textbook_nearest_update(nearest, ray, roots.near - shift, real_roots);
+    textbook_nearest_update(nearest, ray, roots.far - shift, real_roots);
 }
 
 static inline mask textbook_torus_hit(const Torus *torus, const Ray *ray, real *t)
@@ -223,8 +223,8 @@ static inline mask textbook_torus_hit(const Torus *torus, const Ray *ray, real *
     Ray unit = *ray;
     unit.tmin = ray->tmin * norm;
     TextbookNearest nearest = {*t, mask_none()};
-    textbook_quadratic_offer(v, y - u, shift, splits, &unit, &nearest);
-    textbook_quadratic_offer(-v, y + u, shift, splits, &unit, &nearest);
+    textbook_quadratic_push(v, y - u, shift, splits, &unit, &nearest);
+    textbook_quadratic_push(-v, y + u, shift, splits, &unit, &nearest);
     *t = nearest.t * inverse_length;
     return nearest.found;
 }
