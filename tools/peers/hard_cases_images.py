@@ -7,6 +7,7 @@ from math import atan, cos, degrees, radians, sin, sqrt, tan
 
 from hard_cases_programs import Embree, Glint, Povray, Tachyon, povray, tachyon, triple
 from scene import NotModelled, cross, dot, unit
+from tachyon import flipped, frustum, scene_head
 
 U = 2.0**-24
 
@@ -97,26 +98,9 @@ def glint_scene(camera, objects, look, light):
     return json.dumps(scene)
 
 
-def flipped(value):
-    """Returns a value with x negated, because Tachyon's coordinates are left-handed."""
-    if isinstance(value, (list, tuple)):
-        if len(value) == 3 and not isinstance(value[0], (list, tuple)):
-            return [-value[0], value[1], value[2]]
-        return [flipped(part) for part in value]
-    return value
-
-
 def tachyon_scene(program, camera, objects, look, light):
-    width, height = camera.size
-    half_pixel = camera.half_tangent / height
-    top, right = camera.half_tangent, camera.half_tangent * width / height
-    # Tachyon's rays pass through the upper right corners of the pixels
-    frustum = [side - half_pixel for side in (-right, right, -top, top)]
-    lines = [
-        f"Begin_Scene\nResolution {width} {height}\nCamera\nZoom 1\nAspectratio 1\nAntialiasing 0\nRaydepth 1",
-        f"Center {triple(flipped(camera.eye))}\nViewDir {triple(flipped(camera.forward))}",
-        f"UpDir {triple(flipped(camera.up))}\nFrustum {triple(frustum)}\nEnd_Camera\nBackground 0 0 0",
-    ]
+    view = [*map(flipped, (camera.eye, camera.forward, camera.up)), frustum(camera.half_tangent, camera.size)]
+    lines = [scene_head(camera.size, view, written=triple)]
     if light:
         kind, *places, intensity = light
         color = triple([intensity] * 3)

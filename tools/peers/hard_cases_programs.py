@@ -9,11 +9,17 @@ import subprocess
 import tempfile
 from array import array
 
-from scene import NotModelled
+from povray import vector
+from scene import NotModelled, triple as scene_triple
+from tachyon import scene_head
 
 
-def triple(values, between=" "):
-    return between.join(repr(float(x)) for x in values)
+def number(value):
+    return repr(float(value))
+
+
+def triple(values):
+    return scene_triple(values, number)
 
 
 def box_triangles(low, high):
@@ -135,7 +141,7 @@ class Povray:
     @staticmethod
     def vector(values):
         """Returns a vector with its coordinates rotated by one place, because POV-Ray's tori lie around y and ours around z."""
-        return "<" + triple([values[1], values[2], values[0]], ", ") + ">"
+        return vector([values[1], values[2], values[0]], number)
 
     SHAPES = {
         "sphere": "sphere {{ {center}, {radius}", "plane": "plane {{ {normal}, 0 translate {point}",
@@ -233,13 +239,8 @@ class Tachyon:
     def trace_one(folder, scene, origin, direction):
         up = min(((abs(x), k) for k, x in enumerate(direction)))[1]
         # the pixel's ray passes through the frustum's upper right corner, which is the middle of the view
-        head = (
-            "Begin_Scene\nResolution 1 1\nCamera\nZoom 1\nAspectratio 1\nAntialiasing 0\nRaydepth 1\n"
-            f"Center {triple(origin)}\nViewDir {triple(direction)}\n"
-            f"UpDir {triple([float(k == up) for k in range(3)])}\n"
-            "Frustum -1e-9 0 -1e-9 0\nEnd_Camera\nBackground 0 0 0\n"
-        )
-        (folder / "scene").write_text(head + scene + "End_Scene\n")
+        head = scene_head((1, 1), (origin, direction, [k == up for k in range(3)], [-1e-9, 0, -1e-9, 0]), written=triple)
+        (folder / "scene").write_text(head + "\n" + scene + "End_Scene\n")
         tachyon([folder / "scene", "-o", folder / "ray.ppm"])
         return pixel_object(folder / "ray.ppm")
 

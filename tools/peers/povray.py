@@ -1,13 +1,13 @@
 """Writes a scene in POV-Ray's language (version 3.7, Debian package povray) and runs it."""
 import re
 
-from scene import cross, unit
+from scene import cross, triple, unit
 
 SETTINGS = "#version 3.7;\nglobal_settings { assumed_gamma 1 ambient_light rgb 1 max_trace_level 6 adc_bailout 0 }\n"
 
 
-def vector(values):
-    return "<" + ",".join(f"{value:.9g}" for value in values) + ">"
+def vector(values, *number):
+    return f"<{triple(values, *number, between=',')}>"
 
 
 def material_text(name, material, ambient):

@@ -63,8 +63,8 @@ def unit(a):
     return [part / length for part in a] if length else [0, 0, 0]
 
 
-def triple(values):
-    return " ".join(f"{value:.9g}" for value in values)
+def triple(values, number="{:.9g}".format, between=" "):
+    return between.join(map(number, values))
 
 
 def rotation(degrees):

@@ -4,17 +4,32 @@ import re
 from scene import NotModelled, triple
 
 
+def flipped(value):
+    """Returns a value with x negated, because Tachyon's coordinates are left-handed."""
+    if isinstance(value, (list, tuple)):
+        if len(value) == 3 and not isinstance(value[0], (list, tuple)):
+            return [-value[0], value[1], value[2]]
+        return [flipped(part) for part in value]
+    return value
+
+
 def place(values):
-    """Returns a point or direction with x negated, because Tachyon's coordinates are left-handed."""
-    return triple([-values[0], *values[1:]])
+    return triple(flipped(values))
 
 
-def frustum(scene, size):
+def frustum(half_tangent, size):
     """Returns the image's left, right, bottom and top at a distance of 1, shifted by half a pixel to the left and down, because
     Tachyon's rays pass through the upper right corners of the pixels and those of the others through the centers."""
-    top, half_pixel = scene.half_tangent(), scene.half_tangent() / size[1]
-    right = top * size[0] / size[1]
-    return [side - half_pixel for side in (-right, right, -top, top)]
+    half_pixel, right = half_tangent / size[1], half_tangent * size[0] / size[1]
+    return [side - half_pixel for side in (-right, right, -half_tangent, half_tangent)]
+
+
+def scene_head(size, camera, background=(0, 0, 0), written=triple):
+    """Returns what precedes the lights. `camera` has the eye, view and up directions, left-handed, and the frustum. `written`
+    writes a vector."""
+    eye, view, up, sides = map(written, camera)
+    return (f"Begin_Scene\nResolution {size[0]} {size[1]}\nCamera\nZoom 1\nAspectratio 1\nAntialiasing 0\nRaydepth 1\n"
+            f"Center {eye}\nViewDir {view}\nUpDir {up}\nFrustum {sides}\nEnd_Camera\nBackground {written(background)}")
 
 
 def texture(material, ambient):
@@ -45,11 +60,8 @@ def write_scene(scene, path, size):
         raise NotModelled("no instances")
     with open(path, "w") as file:
         write = file.write
-        write(f"Begin_Scene\nResolution {size[0]} {size[1]}\nCamera\nZoom 1\n"
-              "Aspectratio 1\nAntialiasing 0\nRaydepth 1\n"
-              f"Center {place(scene.camera['position'])}\nViewDir {place(scene.view())}\n"
-              f"UpDir {place(scene.up())}\n"
-              f"Frustum {triple(frustum(scene, size))}\nEnd_Camera\nBackground {triple(scene.background)}\n")
+        camera = [*map(flipped, (scene.camera["position"], scene.view(), scene.up())), frustum(scene.half_tangent(), size)]
+        write(scene_head(size, camera, scene.background) + "\n")
         for position, color in scene.lights:
             write(f"Light Center {place(position)} Rad 0.01 Color {triple(color)}\n")
         for direction, color in scene.suns:
