@@ -57,14 +57,24 @@ offers 'glint scenes/demo.yaml --si' --size
 offers 'glint check --le' --lenient
 offers 'glint render --lanes 1' '1 16'
 offers 'glint render --tone f' filmic
+offers 'glint render --format p' 'png ppm'
+offers 'glint verify --format j' 'json junit'
+offers 'glint bench --device g' gpu
 offers 'glint render --precision ' 'single strict double certified'
 offers 'glint trace --precision ' 'single strict double certified'
 offers 'glint render --timing = j' json
 offers 'glint render --aov no' normal
 offers 'glint render --timing LICEN' LICENSE
 if command -v fish >/dev/null; then
-    offered=$(PATH=$(dirname "$(realpath "$GLINT")"):$PATH fish -c '. tools/completions/glint.fish; complete -C "glint render --la"')
-    [ "$offered" = "--lanes	rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)" ] || {
+    offered=$(PATH=$(dirname "$(realpath "$GLINT")"):$PATH fish -c '. tools/completions/glint.fish
+        for line in "render --la" "verify --format ju" "render --device g" "bench --bvh on,of" "render LICEN"
+            complete -C "glint $line"
+        end')
+    [ "$offered" = "--lanes	rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)
+junit
+gpu
+on,off
+LICENSE" ] || {
         echo "fish offers '$offered'"
         failed=1
     }

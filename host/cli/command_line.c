@@ -279,6 +279,22 @@ static int help_print(const CommandLine *line)
     return EXIT_DONE;
 }
 
+// Prints one option per line for completions and manual pages. Tabs separate its names, its argument, its
+// choices and each line of its help.
+static void options_list(const Option *options, size_t count)
+{
+    for (const Option *option = options; option < options + count; option++) {
+        if (option->letter) printf("-%c ", option->letter);
+        printf("--%s\t%s\t", option->name, option->argument ? option->argument : "");
+        for (size_t i = 0; i < option->name_count; i++)
+            printf("%s%s", i > 0 ? " " : "", option->names[i]);
+        putchar('\t');
+        for (const char *at = option->help; *at != '\0'; at++)
+            putchar(*at == '\n' ? '\t' : *at);
+        putchar('\n');
+    }
+}
+
 // Stores the operands. Returns false with a message if one is missing or superfluous.
 static bool operands_read(const CommandLine *line, void *options, CommandOperands operands)
 {
@@ -344,6 +360,12 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
     if (line->usage) {
         long_options[count] = (struct option){"help", no_argument, NULL, 'h'};
         *letter = 'h';
+    }
+    if (line->usage && strcmp(arguments[argument_count - 1], "--list-options") == 0) {
+        for (const OptionGroup *group = line->groups; group->items; group++)
+            options_list(group->items, group->count);
+        options_list(help_option, 1);
+        return EXIT_DONE;
     }
     optind = 0; // restarts getopt
     for (int code; (code = getopt_long(argument_count, arguments, letters, long_options, NULL)) != -1;) {

@@ -1,34 +1,31 @@
-# Completes command lines of glint in fish. The commands and options, with what they do, are those that --help lists.
+# Completes command lines of glint in fish. The commands are those that --help lists, the options and their choices those of
+# --list-options.
 
 function __glint_options
-    glint (commandline -opc)[2] --help | string replace -rf '^ +(?:-\w, )?(--[a-z-]+)\S*(?: \S+)?(?:  +(.*))?$' '$1\t$2'
+    glint (commandline -opc)[2] --list-options
 end
 
-function __glint_precisions
-    glint (commandline -opc)[2] --help | string match -e -- --precision | string replace -r ' \(.*' '' |
-        string match -ar 'single|strict|double|certified'
-end
-
-function __glint_aovs
-    glint render --help | string replace -rf '^ {26}(\w+): .*' '$1'
-end
-
-# Returns whether the previous word is one of these options.
-function __glint_after
-    contains -- (commandline -opc)[-1] $argv
+# Prints the choices of the option before the cursor, or returns false.
+function __glint_choices
+    set -l option (commandline -opc)[-1]
+    set -l found $option D 'cpu gpu'
+    if test $option = --device
+        set found[3] 'cpu gpu all'
+    else if test $option != --reference-device
+        set found (__glint_options | string match -r -- '^(?:-. )?'(string escape --style=regex -- $option)'\t([^\t[]+)\t([^\t]+)\t')
+        or return
+    end
+    set -l choices (string split ' ' $found[3])
+    if test $found[2] = LIST
+        __fish_append , $choices
+    else
+        printf '%s\n' $choices
+    end
 end
 
 complete -c glint -f
 complete -c glint -n __fish_use_subcommand -a '(glint --help | string replace -rf "^  (\w+)  +(.*)" "\$1\t\$2")'
 complete -c glint -n __fish_use_subcommand -F
-complete -c glint -n 'not __fish_use_subcommand; and string match -q -- "-*" (commandline -ct)' -a '(__glint_options)'
-complete -c glint -n 'not __fish_use_subcommand; and not __glint_after --precision --lanes --bvh --bits --transfer --tone --aov' -F
-complete -c glint -n '__glint_after --precision' -a '(__glint_precisions)'
-complete -c glint -n '__glint_after --lanes' -a '1 4 8 16'
-complete -c glint -n '__glint_after --bvh' -a 'auto on off'
-complete -c glint -n '__glint_after --bits' -a '8 16'
-complete -c glint -n '__glint_after --transfer' -a 'srgb none'
-complete -c glint -n '__glint_after --tone' -a 'none filmic'
-complete -c glint -n '__glint_after --device' -a 'cpu gpu all'
-complete -c glint -n '__glint_after --reference-device' -a 'cpu gpu'
-complete -c glint -n '__glint_after --aov' -a '(__fish_append , (__glint_aovs))'
+complete -c glint -n 'not __fish_use_subcommand; and string match -q -- "-*" (commandline -ct)' -a '(__glint_options | string replace -r "^.*?(--[a-z-]+)\t[^\t]*\t[^\t]*\t([^\t]*).*" "\$1\t\$2")'
+complete -c glint -n 'not __fish_use_subcommand; and not __glint_choices >/dev/null' -F
+complete -c glint -n 'not __fish_use_subcommand' -a '(__glint_choices)'

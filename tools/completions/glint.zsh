@@ -1,38 +1,35 @@
 #compdef glint
-# Completes command lines of glint in zsh. The commands and options, with what they do, are those that --help lists.
+# Completes command lines of glint in zsh. The commands are those that --help lists, the options and their choices those of
+# --list-options.
 
 _glint() {
-    local -a found
+    local -a found options fields
     if ((CURRENT == 2)); then
         found=(${(f)"$(glint --help | sed -n 's/^  \([a-z][a-z]*\)  *\(.*\)/\1:\2/p')"})
         _describe command found
         _files
         return
     fi
-    local option=$words[CURRENT-1]
+    local option=$words[CURRENT-1] tab=$'\t'
     if compset -P '--*='; then option=${IPREFIX%=}; fi
+    options=(${(f)"$(glint $words[2] --list-options)"})
+    fields=(${(M)options:#(|-? )$option$tab*})
+    fields=("${(@ps:\t:)fields[1]}") # names, argument, choices, help
     case $option in
-    --precision)
-        compadd ${(f)"$(glint $words[2] --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'single|strict|double|certified')"}
-        ;;
-    --lanes) compadd 1 4 8 16 ;;
-    --bvh) compadd auto on off ;;
-    --bits) compadd 8 16 ;;
-    --transfer) compadd srgb none ;;
-    --tone) compadd none filmic ;;
-    --device) compadd cpu gpu all ;;
-    --reference-device) compadd cpu gpu ;;
-    --timing) [[ -n $IPREFIX ]] && compadd json trace || _files ;;
-    --aov) _sequence compadd - ${(f)"$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p')"} ;;
-    *)
-        if [[ $PREFIX == -* ]]; then
-            found=(${(f)"$(glint $words[2] --help | sed -nE 's/^ +(-[a-z], )?(--[a-z-]+)[^ ]*( [^ ]+)?(  +(.*))?$/\2:\5/p')"})
-            _describe -o option found
-        else
-            _files
-        fi
-        ;;
+    --device) fields[3]="cpu gpu all" ;;
+    --reference-device) fields[3]="cpu gpu" ;;
     esac
+    if [[ -n $fields[3] && ( $fields[2] != \[* || -n $IPREFIX ) ]]; then
+        if [[ $fields[2] == LIST ]]; then _sequence compadd - ${=fields[3]}; else compadd ${=fields[3]}; fi
+    elif [[ $PREFIX == -* ]]; then
+        for fields in $options; do
+            fields=("${(@ps:\t:)fields}")
+            found+=("${fields[1]##* }:$fields[4]")
+        done
+        _describe -o option found
+    else
+        _files
+    fi
 }
 
 _glint "$@"
