@@ -94,9 +94,10 @@ class Golden(TestCase):
         self.assertEqual(sorted(map(list, layers.values())), [["color"], ["normal"], ["object"], ["path"], ["shadow"], ["t"]])
 
     def test_comments_and_line_ends(self):
-        write("golden.txt", "# mine\n")
-        self.assertEqual(self.written().count("# mine\n"), 1)
-        self.assertEqual(self.written().count("# mine\n"), 1)
+        comments = "# mine\n#\n# of the layers' values\n"
+        write("golden.txt", comments)
+        self.assertEqual(self.written().count(comments), 1)
+        self.assertEqual(self.written().count(comments), 1)
         write("golden.txt", read("golden.txt").replace("\n", "\r\n"))
         self.assertEqual(self.glint("golden check").stdout, "s.yaml: same\n")
 
@@ -127,6 +128,9 @@ class Golden(TestCase):
         for wrong in "size=0x18" + line.split("size=24x18")[1], line.replace("tiles=", "tiles=g"), line.replace(" path=", " paths="), "x\n":
             write("golden.txt", wrong)
             self.refuses("golden check", r"golden\.txt:\d+:1: error: expected a line of glint golden write")
+        for wrong in f"# a\0{'b' * 4000}\r\n", line.replace("s.yaml", "s.yaml\0"):
+            write("golden.txt", wrong)
+            self.refuses("golden check", r"golden\.txt:\d:1: error: the line has a NUL character")
         write("golden.txt", line + line.splitlines()[-1] + "\n")
         self.refuses("golden check", r'golden\.txt:4:1: error: a second line for "s\.yaml"')
         write("golden.txt", "# nothing\n")

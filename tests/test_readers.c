@@ -231,9 +231,9 @@ static void reader_feed(void *context)
 
 TEST(readers_survive_damage)
 {
-    static const char *const readers[] = {"png", "jpeg", "ppm",   "exr",        "npy",   "obj",     "mtl",
-                                          "ply", "stl",  "gltf",  "glb",        "yaml",  "rt",      "cfg",
-                                          "nff", "dat",  "reply", "checkpoint", "cache", "baseline"};
+    static const char *const readers[] = {
+        "png",  "jpeg", "ppm", "exr", "npy", "obj",   "mtl",        "ply",   "stl",      "gltf",  "glb",
+        "yaml", "rt",   "cfg", "nff", "dat", "reply", "checkpoint", "cache", "baseline", "golden"};
     for (size_t i = 0; i < COUNT_OF(readers); i++) {
         Feeding feeding = {readers[i], tests_are_long() ? 20000 : 1000, 0};
         const ChildEnd end = child_run(reader_feed, &feeding, sizeof feeding);

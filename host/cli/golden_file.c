@@ -10,9 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char file_head[] = "# glint golden 1: images at strict; glint golden check compares them. "
-                                "Hashes are of the scene as the device gets it,\n"
-                                "# of the layers' values, and of 12 x 8 tiles of the color.\n";
+static const char *const file_head[] = {"# glint golden 1: images at strict; glint golden check compares "
+                                        "them. Hashes are of the scene as the device "
+                                        "gets it,",
+                                        "# of the layers' values, and of 12 x 8 tiles of the color."};
 
 const Layer hashed_layers[] = {LAYER_OBJECT, LAYER_T, LAYER_NORMAL, LAYER_SHADOW, LAYER_PATH, LAYER_COLOR};
 
@@ -81,7 +82,8 @@ static char *line_add(GoldenFile *file, const char *line)
 {
     GoldenLine golden = {0};
     if (*line == '#') {
-        if (!strstr(file_head, line)) text_appendf(&file->comments, "%s\n", line);
+        if (strcmp(line, file_head[0]) != 0 && strcmp(line, file_head[1]) != 0)
+            text_appendf(&file->comments, "%s\n", line);
     } else if (golden_read(&golden, line) && golden_file_find(file, golden.scene)) {
         char *fault = text_format("a second line for \"%s\"", golden.scene);
         free(golden.scene);
@@ -103,9 +105,10 @@ bool golden_file_read(GoldenFile *file, const char *path, MessageList *messages)
     for (size_t start = 0, end; start < text.count; start = end + 1) {
         const char *newline = memchr(text.items + start, '\n', text.count - start);
         end = newline ? (size_t)(newline - text.items) : text.count;
-        char *line = text_format("%.*s", (int)(end - start), text.items + start);
-        if (end > start && text.items[end - 1] == '\r') line[end - start - 1] = '\0';
-        char *fault = line_add(file, line);
+        const size_t length = end - start - (end > start && text.items[end - 1] == '\r');
+        char *line = memory_copy_part(text.items + start, length);
+        char *fault =
+            strlen(line) < length ? text_format("the line has a NUL character") : line_add(file, line);
         if (fault) message_add_at(messages, MESSAGE_ERROR, &source, start, "%s", fault);
         is_sound = is_sound && !fault;
         free(fault);
@@ -118,7 +121,7 @@ bool golden_file_read(GoldenFile *file, const char *path, MessageList *messages)
 bool golden_file_write(const GoldenFile *file, const char *path, MessageList *messages)
 {
     Text text = {0};
-    text_appendf(&text, "%s%s", file_head, text_c(&file->comments));
+    text_appendf(&text, "%s\n%s\n%s", file_head[0], file_head[1], text_c(&file->comments));
     for (size_t i = 0; i < file->count; i++) {
         golden_append(&text, &file->items[i]);
         text_append(&text, "\n", 1);

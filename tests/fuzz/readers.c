@@ -7,6 +7,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/cli/golden_file.h"
 #include "host/image/image.h"
 #include "host/import/load.h"
 #include "host/import/mesh/assimp_process.h"
@@ -188,6 +189,14 @@ static void baseline_fuzz(const char *path, const Source *source, MessageList *m
     if (baseline) baseline_close(baseline);
 }
 
+static void golden_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    (void)source;
+    GoldenFile file = {0};
+    verdict_check(golden_file_read(&file, path, messages), messages);
+    golden_file_free(&file);
+}
+
 static const struct {
     const char *name, *file; // without one it reads only the source
     void (*read)(const char *path, const Source *source, MessageList *messages);
@@ -216,6 +225,7 @@ static const struct {
     {"checkpoint", "a", checkpoint_fuzz},
     {"cache", NULL, cache_fuzz},
     {"baseline", "a.json", baseline_fuzz},
+    {"golden", "a.txt", golden_fuzz},
 };
 
 static size_t reader;
