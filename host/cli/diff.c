@@ -65,6 +65,9 @@ static const char *options_check(void *diff_options)
     options->test_path = options->images.items[1];
     if (options->heatmap_path && image_format_of(options->heatmap_path) == IMAGE_UNKNOWN)
         return "the heat map's name must end in .png, .ppm, .exr or .npy";
+    if (options->layer && image_format_of(options->reference_path) != IMAGE_EXR &&
+        image_format_of(options->test_path) != IMAGE_EXR)
+        return "--layer is for EXR files, but neither image is one";
     return NULL;
 }
 
