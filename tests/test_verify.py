@@ -46,6 +46,18 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
         queue, kernel, dimensions, first, items, group, count, events, event);
 }
 """
+# The driver ends the process with STATUS, or by a signal without one, before the first case.
+ENDING = """
+#include <signal.h>
+#include <stdlib.h>
+
+void clCreateContext(void)
+{
+    const char *status = getenv("STATUS");
+    if (status) exit(atoi(status));
+    raise(SIGKILL);
+}
+"""
 DEVICE_FUNCTIONS = (
     "sqrt|rsqrt|pow|powr|pown|exp|exp2|log|log2|native_[a-z0-9]*|half_[a-z]+|normalize|length|distance|sin|cos|tan|acos|"
     "atan2?|hypot|mad|mix|smoothstep|dot|cross|fmod"
@@ -138,6 +150,13 @@ class Verify(VerifyTestCase):
         self.assertEqual(process.returncode, 3)
         self.assertRegex(process.stdout, r"\A.*; reference of .*\nsingle\n  S2 .* FAIL  clEnqueue.* at the kernel path\n"
                                          r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
+
+    @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
+    def test_an_end_between_cases(self):
+        """Whatever the status of a process that ends before its cases, they have not passed, and the reason is printed."""
+        shim = shim_build("ending.so", ENDING)
+        for env, reason in ({"STATUS": "0"}, "ended with status 0"), ({"STATUS": "1"}, "ended with status 1"), ({}, "ended by a signal: Killed"):
+            self.refuses("verify S1 --precision single", rf"\Aglint: the process (was )?{reason}\n\Z", 2, env={"LD_PRELOAD": shim} | env)
 
     def test_progress(self):
         """Progress on a terminal names the case and the number of cases."""

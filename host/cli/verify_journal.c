@@ -29,18 +29,23 @@ static CaseRecord *running_case(VerifyJournal *journal)
     return NULL;
 }
 
-static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
+// Completes journal->crash, which a crash in an OpenCL call has set.
+static void crash_describe(VerifyJournal *journal, int status)
+{
+    if (journal->crash[0] != '\0') return;
+    if (WIFSIGNALED(status))
+        snprintf(journal->crash, sizeof journal->crash, "the process was ended by a signal: %s",
+                 strsignal(WTERMSIG(status)));
+    else
+        snprintf(journal->crash, sizeof journal->crash, "the process ended with status %d",
+                 WEXITSTATUS(status));
+}
+
+static void crash_record(VerifyJournal *journal, CaseRecord *record)
 {
     record->state = CASE_CRASHED;
     record->seconds = clock_seconds() - record->start_seconds;
-    if (journal->crash[0] != '\0')
-        memcpy(record->crash, journal->crash, sizeof record->crash);
-    else if (WIFSIGNALED(status))
-        snprintf(record->crash, sizeof record->crash, "the process was ended by a signal: %s",
-                 strsignal(WTERMSIG(status)));
-    else
-        snprintf(record->crash, sizeof record->crash, "the process ended with status %d",
-                 WEXITSTATUS(status));
+    memcpy(record->crash, journal->crash, sizeof record->crash);
     journal->crash[0] = '\0';
 }
 
@@ -78,10 +83,14 @@ int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void
         while (waitpid(child, &status, 0) < 0 && errno == EINTR)
             ;
         CaseRecord *running = running_case(journal);
+        // a fault ends the process with EXIT_MACHINE after its message
+        const bool has_status =
+            WIFEXITED(status) && (journal->is_ended || (!running && WEXITSTATUS(status) == EXIT_MACHINE));
+        if (!has_status) crash_describe(journal, status);
         if (journal->is_ended || !running) {
             if (journal->crash[0] != '\0') fprintf(stderr, "glint: %s\n", journal->crash);
-            return WIFEXITED(status) ? WEXITSTATUS(status) : EXIT_MACHINE;
+            return has_status ? WEXITSTATUS(status) : EXIT_MACHINE;
         }
-        crash_record(journal, running, status);
+        crash_record(journal, running);
     }
 }

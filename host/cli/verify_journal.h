@@ -38,5 +38,6 @@ void child_end_with(pid_t parent);
 VerifyJournal *verify_journal_open(void);
 // Calls `work` in a child process. If the child ends while a case is running, records the case as crashed and
 // calls `work` in another child, which continues with the pending cases. Returns the exit status of `work` in
-// the last child, and that child's exit status in the parent. No OpenCL call may have been made before.
+// the last child, and that child's exit status in the parent, or EXIT_MACHINE with a message if the child
+// ended before `work` returned. No OpenCL call may have been made before.
 int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void *context);
