@@ -65,13 +65,13 @@ class Report(TestCase):
         return [(step, failure) for step, failure in found if failure]
 
     def test_archive(self):
-        errors, files = self.report()
+        errors, files = self.report(f"{SMALL} {'S1 ' * 40} S5")
         self.assertEqual((errors, self.failures(files)), ("", []))
         devices, passports, verify, bench = (json.loads(files[f"{step}.json"]) for step in STEPS)
         self.assertEqual(devices["devices"][0]["name"], passports["devices"][0]["name"])
         self.assertTrue(passports["devices"][0]["passports"])
         precision, = verify["precisions"]
-        self.assertEqual([(case["name"], case["passed"]) for case in precision["cases"]], [("S1", True)])
+        self.assertEqual([(case["name"], case["passed"]) for case in precision["cases"]], [("S1", True), ("S5", True)])
         self.assertIn("S1", files["verify.txt"])
         run, = bench["runs"]
         self.assertEqual((run["scene"], run["lanes"], run["size"]), ("scene.yaml", 1, [160, 120]))
@@ -121,6 +121,7 @@ class Report(TestCase):
         self.assertEqual((os.listdir("temporary"), os.path.exists("r.tar.gz")), ([], False))
 
     def test_refused(self):
+        self.refuses(f"{SMALL} S99", 'no case "S99".* S1, S2, ')
         self.refuses(f"{SMALL} --seconds 0", "--seconds: expected a number above 0")
         self.refuses(f"{SMALL} --lanes 3", "--lanes: expected 1")
         self.refuses(f"{SMALL} --precision certified", "--precision: expected single, strict or double, not .certified")

@@ -1,6 +1,8 @@
 // The subcommands. Each receives its name as the first argument and returns the exit status.
 #pragma once
 
+#include <stdbool.h>
+
 // COMMAND(name, purpose)
 #define COMMAND_LIST(COMMAND)                                                                                \
     COMMAND(render, "render a scene file to an image")                                                       \
@@ -19,3 +21,6 @@
 
 #define COMMAND_DECLARATION(name, purpose) int command_##name(int argument_count, char **arguments);
 COMMAND_LIST(COMMAND_DECLARATION)
+
+// Returns whether glint verify has a case of this name. If not, prints the cases.
+bool verify_case_check(const char *name);

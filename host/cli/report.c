@@ -32,7 +32,7 @@ static const char scene_text[] = "# What glint bench times for glint report.\n"
                                  "  - sphere: {center: [-1, 1, 0], radius: 1, material: {reflection: 0.4}}\n"
                                  "  - triangle: {vertices: [[1, 0, 0], [2, 0, 1], [1.5, 1.5, 0.5]]}\n";
 
-enum { PASSED_MAX = 5, ARGUMENTS_MAX = 40 };
+enum { PASSED_MAX = 5, STEP_ARGUMENTS_MAX = 12 };
 
 typedef struct {
     CommonOptions common;
@@ -71,6 +71,17 @@ static void passed_list(ReportChoice *choice)
     choice->passed_count = (size_t)(next - choice->passed);
 }
 
+static bool is_bench_report(const char *operand)
+{
+    const char *ending = strrchr(operand, '.');
+    return ending && strcmp(ending, ".json") == 0;
+}
+
+static bool operand_check(const char *operand)
+{
+    return is_bench_report(operand) || verify_case_check(operand);
+}
+
 // Checks the operands, which are cases, or reports of glint bench to compare.
 static const char *options_check(void *report_choice)
 {
@@ -78,10 +89,8 @@ static const char *options_check(void *report_choice)
     const size_t operand_count = choice->operands.count;
     passed_list(choice);
     size_t count = 0;
-    for (size_t i = 0; i < operand_count; i++) {
-        const char *ending = strrchr(choice->operands.items[i], '.');
-        count += ending && strcmp(ending, ".json") == 0;
-    }
+    for (size_t i = 0; i < operand_count; i++)
+        count += is_bench_report(choice->operands.items[i]);
     choice->compares = count > 0 || choice->page;
     if (!choice->compares) return NULL;
     if (count == 0) return "--html needs reports of glint bench, whose names end in .json";
@@ -112,12 +121,13 @@ static const CommandLine command_line = {
                 "devices, versions or days. A\nrow is faster or slower than in the first report only where "
                 "both are of the same device and host.\n"}},
     OPERANDS(ANY, ReportChoice, operands),
+    .operand_check = operand_check,
     .check = options_check};
 
 // A command that the report runs in its folder. It prints to the file `name`.`prints`.
 typedef struct {
     const char *name, *prints;
-    const char *arguments[12];
+    const char *arguments[STEP_ARGUMENTS_MAX];
     bool has_options, has_cases; // whether the user's options and cases follow
 } Step;
 
@@ -212,27 +222,32 @@ static char *status_failure(int status)
 // Starts a step. Returns 0 or an error number.
 static int step_start(const Step *step, const ReportChoice *choice, const char *folder, pid_t *process)
 {
-    char *arguments[ARGUMENTS_MAX] = {"glint"};
-    size_t count = 1;
+    char name[] = "glint";
+    char **arguments = memory_allocate_zeroed(
+        1 + STEP_ARGUMENTS_MAX + PASSED_MAX + choice->operands.count + 1, sizeof *arguments);
+    size_t count = 0;
+    arguments[count++] = name;
     for (size_t i = 0; step->arguments[i]; i++)
         arguments[count++] = (char *)step->arguments[i];
     for (size_t i = 0; step->has_options && i < choice->passed_count; i++)
         arguments[count++] = choice->passed[i];
-    for (size_t i = 0; step->has_cases && i < choice->operands.count && count + 1 < ARGUMENTS_MAX; i++)
+    for (size_t i = 0; step->has_cases && i < choice->operands.count; i++)
         arguments[count++] = choice->operands.items[i];
-    posix_spawn_file_actions_t actions;
-    int error = posix_spawn_file_actions_init(&actions);
-    if (error) return error;
     char *output = text_format("%s/%s.%s", folder, step->name, step->prints),
          *messages = text_format("%s/%s.log", folder, step->name);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output, O_WRONLY | O_CREAT, 0600);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT, 0600);
-    posix_spawn_file_actions_addchdir_np(&actions, folder);
-    error = posix_spawn(process, "/proc/self/exe", &actions, NULL, arguments, environ);
-    posix_spawn_file_actions_destroy(&actions);
+    posix_spawn_file_actions_t actions;
+    int error = posix_spawn_file_actions_init(&actions);
+    if (!error) {
+        posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+        posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output, O_WRONLY | O_CREAT, 0600);
+        posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT, 0600);
+        posix_spawn_file_actions_addchdir_np(&actions, folder);
+        error = posix_spawn(process, "/proc/self/exe", &actions, NULL, arguments, environ);
+        posix_spawn_file_actions_destroy(&actions);
+    }
     free(output);
     free(messages);
+    free(arguments);
     return error;
 }
 

@@ -56,10 +56,10 @@ static size_t case_index(const char *name)
     return i;
 }
 
-static bool case_check(const char *name)
+bool verify_case_check(const char *name)
 {
     if (verify_case_name(case_index(name))) return true;
-    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
+    fprintf(stderr, "glint: there is no case \"%s\"; the cases are ", name);
     for (size_t i = 0; verify_case_name(i); i++)
         fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
     fprintf(stderr, " (docs/verify.md)\n");
@@ -77,7 +77,7 @@ static const CommandLine command_line = {
                OPTIONS(driver_options), OPTIONS(keep_kernels_option), OPTIONS(perturb_option),
                REPORT_OPTIONS},
     OPERANDS(ANY, VerifyOptions, names),
-    .operand_check = case_check};
+    .operand_check = verify_case_check};
 
 typedef struct {
     const VerifyOptions *options;
