@@ -55,7 +55,8 @@ WRONG_COMMAND_LINES = [
     (r"one scene, but 'b\.yaml' is a second", "trace --rays rays sphere.yaml b.yaml"),
     (r"writes CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
-    (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o image.{jpg|PNGX|}"),
+    (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o {image.jpg|image.PNGX|image.|folder}"),
+    (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o notes --skip-existing {|--aov t}"),
     (r"nowhere/image\.png", f"render sphere.yaml {SMALL} -o nowhere/image.png"),
 ]
 

@@ -176,6 +176,7 @@ class Frames(TestCase):
             "--frames 3-2": "--frames: expected all, or A or A-B",
             "--frames -1": "--frames: expected all, or A or A-B",
             "--frames 1x": "--frames: expected all, or A or A-B",
+            "--frames 0-3 -o a-%d.jpg": r"\Aglint render: .*\.png, \.ppm, \.exr or \.npy.*\n\Z",
             "--frames 0-1000000": "--frames: expected all, or A or A-B",
             "--frames all": "--frames all: 'moving.yaml' has no 'frames'; name them, such as 0-47",
             "--frames all -o a.png": "or have a place for the number",

@@ -20,13 +20,6 @@ bool image_output_is_stdout(const char *path)
     return strcmp(path, "-") == 0;
 }
 
-bool image_output_path_known(const char *path)
-{
-    if (image_output_is_stdout(path) || image_format_of(path) != IMAGE_UNKNOWN) return true;
-    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
-    return false;
-}
-
 char *image_output_aov_path(const ImageOutputOptions *options, const char *name)
 {
     const char *dot = strrchr(options->path, '.');

@@ -31,8 +31,6 @@ static inline unsigned image_output_aovs(const ImageOutputOptions *options)
 char *image_output_default_path(const char *scene_path);
 // Returns whether the path is "-", standard output.
 bool image_output_is_stdout(const char *path);
-// Returns whether the path is "-" or has a known ending. If not, prints the known endings.
-bool image_output_path_known(const char *path);
 // Returns the name of an AOV's file: image.png becomes image.NAME.npy. The caller frees it.
 char *image_output_aov_path(const ImageOutputOptions *options, const char *name);
 // Returns true with a message if one of the files is a file that the scene was read from.

@@ -322,7 +322,7 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     Stage *stage = options.timing == TIMING_TRACE ? stage_open(true) : NULL;
     options.common.scene.stage = options.common.settings.stage = stage;
     MessageList printed = {0};
-    if (image_output_path_known(path) && scene_open_once(&scene, options.scene, common, &printed) &&
+    if (scene_open_once(&scene, options.scene, common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.frame = options.frame_count > 0 ? common->scene.frame : NAN,
                            .is_several = options.has_several,

@@ -91,14 +91,20 @@ static const char *stdout_check(const RenderOptions *options)
     return NULL;
 }
 
-// Checks the options that depend on the image's format.
-static const char *display_check(const ImageOutputOptions *output)
+static ImageFormat output_format(const RenderOptions *options)
 {
+    const char *path = options->output.path;
+    const bool may_be_folder = options->scenes.count > 1 || options->frame_count > 0;
+    if (is_to_stdout(&options->output)) return options->output.stdout_format;
+    return path && !(may_be_folder && output_is_folder(path)) ? image_format_of(path) : IMAGE_PNG;
+}
+
+// Checks the options that depend on the image's format.
+static const char *display_check(const RenderOptions *options)
+{
+    const ImageOutputOptions *output = &options->output;
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
-    const ImageFormat format = is_to_stdout(output) ? output->stdout_format
-                               : !output->path || output_is_folder(output->path)
-                                   ? IMAGE_PNG
-                                   : image_format_of(output->path);
+    const ImageFormat format = output_format(options);
     if (is_changed && image_format_holds_floats(format))
         return "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values";
     if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
@@ -215,11 +221,13 @@ static const char *options_check(void *render_options)
     if (options->checkpoint && options->skips_existing && options->output.path &&
         strcmp(options->checkpoint, options->output.path) == 0)
         return "--skip-existing would keep a --checkpoint of the image's name";
-    const char *what = stdout_check(options);
-    if (!what) what = display_check(&options->output);
-    if (what) return what;
     options->has_several = options->scenes.count > 1 || options->frame_count > 1 || options->has_all_frames;
-    if (options->has_several) return several_check(options);
+    const char *what = stdout_check(options);
+    if (!what) what = display_check(options);
+    if (!what && options->has_several) what = several_check(options);
+    if (!what && output_format(options) == IMAGE_UNKNOWN)
+        what = "the name of --output must end in .png, .ppm, .exr or .npy";
+    if (what || options->has_several) return what;
     if (options->skips_existing && timing_uses_stdout(options->timing))
         return "--skip-existing may leave --timing=json or =trace nothing to report";
     return NULL;
