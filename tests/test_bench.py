@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import shutil
 import statistics
 import unittest
 
@@ -166,9 +167,11 @@ class Bench(TestCase):
         self.glint(f"{command} none", status=1)
 
     def test_against(self):
-        """The other program is this one, whose worker's times are scaled."""
+        """The other program is this one, whose worker's times are scaled. A program whose file is removed continues to be measured."""
+        shutil.copy(PROGRAM, "copy")
         write("other", f"""#!/usr/bin/env python3
-import subprocess, sys
+import pathlib, subprocess, sys
+pathlib.Path("copy").unlink(missing_ok=True)
 worker = subprocess.Popen([{str(PROGRAM)!r}, *sys.argv[1:]], stdout=subprocess.PIPE, text=True)
 print(worker.stdout.readline(), end="", flush=True)
 for line in worker.stdout:
@@ -176,7 +179,7 @@ for line in worker.stdout:
 """)
         os.chmod("other", 0o755)
         command = "bench sphere.yaml --size 32x24 --no-build-times --samples 1,2 --against"
-        report = self.json(f"{command} ./other --json", status=3)
+        report = self.json(f"{command} ./other --json", status=3, wrapper=("bash", "-c", 'exec ./copy "$@"'))
         self.assertEqual([run["samples"] for run in report["runs"]], [1, 2])
         for run in report["runs"]:
             self.assertEqual(run["comparison"]["verdict"], "slower")

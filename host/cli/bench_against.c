@@ -10,7 +10,6 @@
 #include "host/cli/report_json.h"
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <math.h>
 #include <signal.h>
 #include <spawn.h>
@@ -315,15 +314,10 @@ static void against_print_text(const Against *against, const Device *device)
 
 int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device)
 {
-    char program[PATH_MAX] = "";
-    if (readlink("/proc/self/exe", program, sizeof program - 1) < 0) {
-        fputs("glint bench: --against needs /proc\n", stderr);
-        return EXIT_MACHINE;
-    }
     Against against = {
         .options = options,
         .set = set,
-        .programs = {program, options->other},
+        .programs = {"/proc/self/exe", options->other},
         .rows = memory_allocate_zeroed(set->count, sizeof *against.rows),
         .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
     };
