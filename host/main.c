@@ -47,7 +47,9 @@ static void program_start(const char *name, char **arguments)
     if (strchr(name, '/')) return;
     char *program = text_format("glint-%s", name);
     execvp(program, arguments);
-    if (errno != ENOENT) fprintf(stderr, "glint: cannot start %s: %s\n", program, strerror(errno));
+    // EACCES may come from a folder of the PATH that cannot be searched
+    if (errno != ENOENT && errno != EACCES)
+        fprintf(stderr, "glint: cannot start %s: %s\n", program, strerror(errno));
     if (strcmp(name, "locate") == 0)
         fputs("glint: glint locate needs glint's Python package with the extra [locate]\n", stderr);
     free(program);

@@ -100,6 +100,10 @@ class Commands(TestCase):
                 with self.subTest(command):
                     self.refuses(command, pattern)
 
+    def test_program_that_cannot_be_started(self):
+        write("glint-rendr", "")
+        self.refuses("rendr", r'\Aglint: unknown command "rendr"; did you mean render\?\n\Z', env={"PATH": os.getcwd()})
+
     def test_help_lists_the_precisions_that_are_accepted(self):
         for command, arguments in PRECISION_COMMANDS.items():
             line = re.search("(?m)^ *--precision .*$", self.glint(f"{command} --help").stdout)[0]
