@@ -102,7 +102,8 @@ int main(int argument_count, char **arguments)
     interrupts_catch();
     fault_catch_crashes();
     int status = command_run(argument_count, arguments);
-    // a report that did not get out whole must not look like one that did
+    if (status == EXIT_INTERRUPTED) interrupt_report("");
+    // a truncated report must not exit with success
     if (fflush(stdout) == 0 && !ferror(stdout)) {
         fault_output_is_complete(status);
         return status;

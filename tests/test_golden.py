@@ -12,16 +12,18 @@ from glint import IS_LONG, ROOT, SPHERE, TestCase, main, png_read, read, shim_bu
 
 LINE = r"size=24x18 samples=1 bounces=5 scene=[0-9a-f]{16}( (object|t|normal|shadow|path|color)=[0-9a-f]{16}){6} tiles=[0-9a-f]{384} s\.yaml\n"
 
-# Changes the lowest bit of word WORD of the MAP-th map of a device's results.
+# Changes the lowest bit of word WORD of the MAP-th map of a device's results, or interrupts at the first.
 SHIM = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <signal.h>
 #include <stdlib.h>
 
 void *clEnqueueMapBuffer(void *queue, void *buffer, unsigned blocking, unsigned long long flags, size_t offset,
                          size_t size, unsigned count, const void *list, void *event, int *status)
 {
     static long maps;
+    if (maps == 0 && getenv("INTERRUPTS")) raise(SIGINT);
     unsigned *words = ((void *(*)())dlsym(RTLD_NEXT, "clEnqueueMapBuffer"))(queue, buffer, 1, flags, offset, size, count, list,
                                                                             event, status);
     if (words && maps++ == atol(getenv("MAP"))) words[atol(getenv("WORD")) % (size / 4)] ^= 1;
@@ -92,6 +94,11 @@ class Golden(TestCase):
             out = self.glint("golden check", status=3, env=env).stdout
             layers.setdefault(i % 6, set()).add(re.match(r"s\.yaml: different, first in (\w+)", out)[1])
         self.assertEqual(sorted(map(list, layers.values())), [["color"], ["normal"], ["object"], ["path"], ["shadow"], ["t"]])
+
+    def test_interrupt(self):
+        env = {"LD_PRELOAD": shim_build("interrupt", SHIM), "MAP": "-1", "INTERRUPTS": "1"}
+        self.assertEqual(self.glint("golden write s.yaml s.yaml --size 24x18", status=130, env=env).stderr, "glint: interrupted\n")
+        self.nothing_left("golden.txt")
 
     def test_comments_and_line_ends(self):
         comments = "# mine\n#\n# of the layers' values\n"

@@ -116,8 +116,8 @@ class Report(TestCase):
             while not any(name.endswith("passports.log") for _, _, names in os.walk("temporary") for name in names):
                 time.sleep(0.01)
             process.send_signal(signal.SIGINT)
-            process.communicate()
-        self.assertEqual(process.returncode, 130)
+            errors = process.communicate()[1]
+        self.assertEqual((process.returncode, errors), (130, "glint: interrupted\n"))
         self.assertEqual((os.listdir("temporary"), os.path.exists("r.tar.gz")), ([], False))
 
     def test_refused(self):

@@ -302,8 +302,6 @@ static int accuracy_run(Accuracy *accuracy)
         first += accuracy->scenes[i].variant_count;
     }
     progress_close(&progress);
-    if (status == EXIT_INTERRUPTED && compute_ok(&accuracy->open.compute))
-        fputs("glint: interrupted\n", stderr);
     if (status != EXIT_DONE) return status;
     const AccuracyReport *report = &accuracy->report;
     const ReportOptions *options = &accuracy->options.variants.common.report;

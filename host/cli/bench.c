@@ -243,11 +243,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     progress_open(&progress, !report_has_text(&bench->options.variants.common.report));
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
-    if (!whole) {
-        if (compute_ok(compute)) fputs("glint: interrupted\n", stderr);
-        return EXIT_INTERRUPTED;
-    }
-    return bench_print(bench, baseline);
+    return whole ? bench_print(bench, baseline) : EXIT_INTERRUPTED;
 }
 
 static int against_run(Bench *bench, int argument_count, char **arguments)

@@ -336,7 +336,6 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
             status = EXIT_USER;
         if (status == EXIT_DONE) status = comparisons_status(against.comparisons, set->count, options->other);
     }
-    if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
     for (size_t i = 0; i < set->count; i++) {
         series_free(&against.rows[i].ratios);
         series_free(&against.rows[i].frames[0]);

@@ -4,6 +4,7 @@
 #include "host/base/exit_status.h"
 #include <signal.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <unistd.h>
 
 static volatile sig_atomic_t interrupted, is_flag_read, is_held;
@@ -80,6 +81,13 @@ void interrupts_set_source(bool (*source)(void *context), void *context)
 bool is_interrupted(void)
 {
     return interrupted != 0 || (other_interrupts && other_interrupts(other_context));
+}
+
+void interrupt_report(const char *consequence)
+{
+    static bool is_reported;
+    if (!is_reported) fprintf(stderr, "glint: interrupted%s\n", consequence);
+    is_reported = true;
 }
 
 bool interrupts_stop(void *context)

@@ -23,5 +23,8 @@ void interrupts_release(void);
 void interrupts_set_source(bool (*source)(void *context), void *context);
 
 bool is_interrupted(void);
+// Prints once that the command was interrupted, followed by the consequence, such as ": no image was
+// written".
+void interrupt_report(const char *consequence);
 // Returns is_interrupted() for a `stop` function, and ignores its context.
 bool interrupts_stop(void *context);

@@ -85,13 +85,12 @@ static bool checkpoint_start(ImageRender *render)
 }
 
 // Prints what an interrupted or failed render has left.
-static void rest_print(const RenderOptions *options)
+static void leftovers_print(const RenderOptions *options)
 {
-    if (is_interrupted() && options->has_format)
-        fprintf(stderr, "glint: interrupted: the image on standard output is incomplete\n");
-    else if (is_interrupted())
-        fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is unchanged\n",
-                options->output.path);
+    char *kept = text_format(": no image was written; an earlier %s is unchanged", options->output.path);
+    if (is_interrupted())
+        interrupt_report(options->has_format ? ": the image on standard output is incomplete" : kept);
+    free(kept);
     if (options->checkpoint)
         fprintf(stderr, "glint: run the same command again to continue; finished bands are in '%s'\n",
                 options->checkpoint);
@@ -173,7 +172,7 @@ static int image_render(ImageRender *render)
     if (is_whole) warnings_add(render);
     const bool is_faulty = message_count(&render->messages, MESSAGE_ERROR) > 0;
     messages_print_once(&render->messages, render->printed, NULL);
-    if (!is_whole) rest_print(options);
+    if (!is_whole) leftovers_print(options);
     if (render->ranks && is_last && options->timing == TIMING_TRACE)
         fprintf(stderr, "glint: --timing=trace covers only the first rank's devices\n");
     if (is_whole && is_last && options->timing != TIMING_NONE)
