@@ -1,4 +1,4 @@
-// glint: the subcommands by name.
+// Runs a subcommand by its name.
 #include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/exit_status.h"

@@ -127,7 +127,7 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     options->scene = render_command_scene(command, index);
     if (options->frame_count > 0) options->common.scene.frame = options->first_frame + (double)index;
     if (options->skips_existing && image_exists(options, command->paths[index])) return EXIT_DONE;
-    render_devices_rest(open);
+    render_devices_release(open);
     interrupts_end_at_once(); // nothing checks the flag while a scene is read
     if (is_interrupted()) return EXIT_INTERRUPTED;
     RenderOptions of_image = *options;

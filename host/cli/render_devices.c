@@ -108,7 +108,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     return is_done;
 }
 
-void render_devices_rest(RenderDevices *open)
+void render_devices_release(RenderDevices *open)
 {
     size_t kept = 0;
     for (size_t i = 0, count = open->count; i < count; i++) {

@@ -32,7 +32,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
 // Warns that a device failed and that the others render its share.
 void render_devices_drop(RenderDevices *open, size_t index);
 // Frees an image's scene, and removes the devices that failed while others are left.
-void render_devices_rest(RenderDevices *open);
+void render_devices_release(RenderDevices *open);
 // Returns whether every device that was not dropped works.
 bool render_devices_work(const RenderDevices *open);
 // Closes the devices. Returns EXIT_MACHINE with a message if a device that was not dropped failed, otherwise

@@ -284,7 +284,7 @@ static int shutter_render(ImageRender *render)
                 status = EXIT_INTERRUPTED;
                 break;
             }
-            render_devices_rest(render->open);
+            render_devices_release(render->open);
         }
         const bool is_moved = shutter->time_count == 1 || scene_advance(render);
         status = is_moved ? time_render(render) : EXIT_USER;
