@@ -105,7 +105,7 @@ function readScene(section, scene) {
   const scrollError = (position, scroll, visible, whole) =>
     Math.abs(scroll - Math.min(Math.max(8 * (position + 0.5) - visible / 2, 0), Math.max(whole - visible, 0)));
   return {
-    heading: find("h2").textContent, panels, labels, chosen, chosenLabels, chosenWide, split, chosenIsShown, zoom: stage.offsetWidth / scene.size[0],
+    heading: find("h2").textContent, facts: find(".facts").textContent, panels, labels, chosen, chosenLabels, chosenWide, split, chosenIsShown, zoom: stage.offsetWidth / scene.size[0],
     offCenter: [scrollError(x, pane.scrollLeft, pane.clientWidth, stage.offsetWidth),
                 scrollError(y, pane.scrollTop, pane.clientHeight, stage.offsetHeight)],
     tables: sortTables(section), pixels: readWorst(scene),

@@ -170,6 +170,9 @@ class Html(TestCase):
             self.assertEqual((found["wide"], found["hiddenBudgets"]), ([], [0]), f"{width} pixels")
             self.assertEqual([drawn["heading"] for drawn in found["scenes"]], [scene["scene"] for scene in report["scenes"]])
             for drawn, scene in zip(found["scenes"], report["scenes"], strict=True):
+                source, device = (scene["reference"].get(name) for name in ("file", "device"))
+                own = "the device’s own image" if device == report["device"]["name"] else f"the image of {device}"
+                self.assertIn(f"Compared with {source or own}", drawn["facts"])
                 measures = {kind for variant in scene["variants"] for kind in variant.get("pareto", {})}
                 self.assertEqual({panel["kind"] for panel in drawn["panels"]}, measures)
                 self.assertEqual(drawn["chosenWide"], [], f"{width} pixels")
@@ -199,6 +202,10 @@ class Html(TestCase):
         """Errors a thousand times those of any device put shadows on whole spheres."""
         page, report = self.page("spheres16.yaml --precision single --samples 1,2 --perturb 1:1000")
         self.assertTrue(report["scenes"][0]["variants"][0]["crossed_out"])
+        reference = report["scenes"][0]["reference"]
+        before, reference["device"] = json.dumps(reference["device"]), "another device"
+        page, count = re.subn(rf'("reference": {{[^}}]*"device": ){re.escape(before)}', r'\1"another device"', page)
+        self.assertEqual(count, 1)
         self.check_drawn(page, report)
 
     def test_reference_from_a_file(self):

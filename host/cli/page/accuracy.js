@@ -58,8 +58,9 @@ function drawFacts({ size: [width, height], pixels, lights, bounces, reference, 
   if (reference.kind === "file") {
     facts.append("Compared with ", html("code", {}, reference.file), ", which has colors only.");
   } else {
-    const { precision, lanes, bvh, samples, kernel_hash: hash } = reference;
-    facts.append(`Compared with the device’s own image at ${precision} (${plural(lanes, "lane")}, BVH ${bvh}, ` +
+    const { device, precision, lanes, bvh, samples, kernel_hash: hash } = reference;
+    const image = device === report.device.name ? "the device’s own image" : `the image of ${device}`;
+    facts.append(`Compared with ${image} at ${precision} (${plural(lanes, "lane")}, BVH ${bvh}, ` +
                  `${plural(samples, "sample")} per pixel, kernel `, html("span", { class: "hash" }, hash), ").");
   }
   if (reference.nonfinite + reference.negative) {
