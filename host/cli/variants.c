@@ -76,32 +76,38 @@ static uint64_t scene_files_hash(const Scene *scene)
     return hash;
 }
 
+// Adds the variants of one scene and choice. `key` has what the scene's rows share.
 static void scene_add_variants(VariantSet *set, const VariantOptions *choices, size_t choice,
-                               const char *path, size_t scene_index)
+                               size_t scene_index, BenchKey key)
 {
     const VariantOptions *options = &choices[choice];
     RenderSettings settings = settings_of_scene(&options->common, &set->scenes[scene_index]);
-    const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
-    const BenchKey key = {.scene = path,
-                          .variant = options->name,
-                          .width = settings.width,
-                          .height = settings.height,
-                          .bounces = settings.bounce_count,
-                          .scene_hash = scene_files_hash(&set->scenes[scene_index])};
-    for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
-        for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
-            for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
-                for (size_t i = 0; i < sample_choices; i++) {
-                    if (!(options->common.precisions >> precision & 1) || !(options->bvhs >> bvh & 1))
-                        continue;
-                    // without --lanes, once with the device's default
-                    if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
-                    settings.precision = (Precision)precision;
-                    settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
-                    settings.bvh = (BvhChoice)bvh;
-                    settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
+    uint32_t lanes_list[LANES_CHOICE_COUNT] = {0}; // without --lanes, 0 for the device's default
+    size_t lanes_count = 0;
+    for (size_t i = 0; i < LANES_CHOICE_COUNT; i++)
+        if (options->lanes >> i & 1) lanes_list[lanes_count++] = lanes_choice_values[i];
+    if (lanes_count == 0) lanes_count = 1;
+    static const uint32_t one_sample = 1;
+    const uint32_t *samples = options->sample_choices > 0 ? options->samples : &one_sample;
+    const size_t samples_count = options->sample_choices > 0 ? options->sample_choices : 1;
+    key.variant = options->name;
+    key.width = settings.width;
+    key.height = settings.height;
+    key.bounces = settings.bounce_count;
+    for (unsigned precision = 0; precision < PRECISION_COUNT; precision++) {
+        if (!(options->common.precisions >> precision & 1)) continue;
+        for (size_t lanes = 0; lanes < lanes_count; lanes++)
+            for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++) {
+                if (!(options->bvhs >> bvh & 1)) continue;
+                settings.precision = (Precision)precision;
+                settings.lanes = lanes_list[lanes];
+                settings.bvh = (BvhChoice)bvh;
+                for (size_t i = 0; i < samples_count; i++) {
+                    settings.sample_count = samples[i];
                     variant_add(set, options, choice, scene_index, &settings, key);
                 }
+            }
+    }
 }
 
 bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t choice_count, char *const *paths,
@@ -117,8 +123,9 @@ bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t cho
     };
     for (size_t i = 0; i < count; i++) {
         if (!scene_open(&set->scenes[i], paths[i], &choices[0].common)) return false;
+        const BenchKey key = {.scene = paths[i], .scene_hash = scene_files_hash(&set->scenes[i])};
         for (size_t k = 0; k < choice_count; k++)
-            scene_add_variants(set, choices, k, paths[i], i);
+            scene_add_variants(set, choices, k, i, key);
     }
     set->row_count = set->count;
     return true;
