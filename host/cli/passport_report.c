@@ -1,8 +1,10 @@
 #include "host/cli/passport_report.h"
 
+#include "host/base/memory.h"
 #include "host/cli/report_json.h"
 #include "host/render/arithmetic.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static void properties_json(Json *json, const Passport *passport)
@@ -51,34 +53,40 @@ void passports_refusals_json(Json *json, const Device *device)
     json_end(json);
 }
 
-// Prints a property. A finding that all precisions share is printed once, any other once per precision.
+// Returns what a passport finds about a property. The caller frees it.
+static Text finding_text(const Passport *passport, Property property)
+{
+    static const char *const marks[] = {
+        [FINDING_SOUND] = "", [FINDING_UNUSUAL] = "unusual: ", [FINDING_BROKEN] = "BROKEN: "};
+    Text what = {0}, text = {0};
+    const Finding finding = passport_finding(passport, property, &what);
+    text_appendf(&text, "%s%s", marks[finding], text_c(&what));
+    text_free(&what);
+    return text;
+}
+
+// Prints each finding about a property once, with its first precision unless all precisions share it.
 static void property_print(const Device *device, Property property)
 {
     const size_t count = passport_count(device);
+    Text *findings = memory_allocate_zeroed(count, sizeof *findings);
+    bool are_alike = true;
     for (size_t i = 0; i < count; i++) {
-        Text what = {0}, other = {0};
-        const Passport *passport = passport_at(device, i);
-        const Finding finding = passport_finding(passport, property, &what);
-        bool is_printed = false, is_everywhere = i == 0;
-        for (size_t j = 0; j < count; j++) {
-            other.count = 0;
-            passport_finding(passport_at(device, j), property, &other);
-            const bool is_same = strcmp(text_c(&what), text_c(&other)) == 0;
-            is_printed = is_printed || (is_same && j < i);
-            is_everywhere = is_everywhere && is_same;
-        }
-        if (!is_printed) {
-            printf("  %-12s  ", i == 0 ? property_names[property] : "");
-            if (!is_everywhere) printf("%s: ", passport_mode_names[passport->mode]);
-            printf("%s%s\n",
-                   finding == FINDING_SOUND    ? ""
-                   : finding == FINDING_BROKEN ? "BROKEN: "
-                                               : "unusual: ",
-                   text_c(&what));
-        }
-        text_free(&what);
-        text_free(&other);
+        findings[i] = finding_text(passport_at(device, i), property);
+        are_alike = are_alike && strcmp(text_c(&findings[i]), text_c(&findings[0])) == 0;
     }
+    for (size_t i = 0; i < count; i++) {
+        bool is_printed = false;
+        for (size_t j = 0; j < i; j++)
+            is_printed = is_printed || strcmp(text_c(&findings[j]), text_c(&findings[i])) == 0;
+        if (is_printed) continue;
+        printf("  %-12s  ", i == 0 ? property_names[property] : "");
+        if (!are_alike) printf("%s: ", passport_mode_names[passport_at(device, i)->mode]);
+        printf("%s\n", text_c(&findings[i]));
+    }
+    for (size_t i = 0; i < count; i++)
+        text_free(&findings[i]);
+    free(findings);
 }
 
 void passports_print(const Device *device)
