@@ -25,7 +25,7 @@ TEST(texts_are_scrubbed)
         {"kernels/0123.cl", "kernels/0123.cl"},
         {"", ""},
     };
-    setenv("HOME", "/home/ann", true);
+    setenv("HOME", "/home/ann/", true);
     setenv("USER", "annuser", true);
     setenv("LOGNAME", "annuser", true);
     Scrubber scrubber = scrubber_open("/srv/here");

@@ -12,7 +12,10 @@ static void word_add(Scrubber *scrubber, const char *word, const char *replaceme
 {
     // a root folder or a name that every system has identifies nobody
     if (!word || strlen(word) < 2 || strcmp(word, "root") == 0 || strcmp(word, "localhost") == 0) return;
-    scrubber->words[scrubber->count].word = memory_copy_text(word);
+    size_t length = strlen(word);
+    while (is_path && length > 1 && word[length - 1] == '/')
+        length--;
+    scrubber->words[scrubber->count].word = memory_copy_part(word, length);
     scrubber->words[scrubber->count].replacement = replacement;
     scrubber->words[scrubber->count++].is_path = is_path;
 }

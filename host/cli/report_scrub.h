@@ -6,7 +6,7 @@
 
 enum { SCRUB_WORDS_MAX = 8 };
 
-// The words to replace. A path is replaced wherever it occurs, a name only as a whole word.
+// The words to replace, if no character of a word follows. A name must also not follow one.
 typedef struct {
     struct {
         char *word;
