@@ -125,8 +125,8 @@ typedef struct {
 // Reads at most list.most values, separated by commas, and sets *list.count. Returns false with a message on
 // a mistake.
 bool option_list(const Option *option, const char *value, OptionReader *read, OptionItems list);
-// Reads decimal digits only, until their number exceeds 2^31. *end receives the position after them. Returns
-// false if there are none.
+// Reads decimal digits until the value is 2^31 or more. *end receives the position after them. Returns false
+// if there are none.
 bool digits_read(const char *value, const char **end, uint64_t *result);
 // Prints what the option expects, as a format, and the value. Returns false.
 bool option_fault(const Option *option, const char *value, const char *expected, ...)

@@ -174,8 +174,8 @@ static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
     return outcome;
 }
 
-// A character that a format reserves, and its replacement. A newline stands for all control characters, and
-// '\0' ends a table.
+// A character that a format reserves, and its replacement. A newline stands for all control characters, which
+// are kept by a table without it. '\0' ends a table.
 typedef struct {
     char character;
     const char *replacement;

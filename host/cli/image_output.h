@@ -16,7 +16,8 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
 double image_output_bytes(const ImageOutput *output);
 // Returns the counts of all bands so far at `certified`.
 RerenderCounts image_output_rerenders(const ImageOutput *output);
-// Moves all files into place and frees the output. Returns false with a message if a file could not be moved.
+// Moves all files into place and frees the output. Returns false with a message if a file could not be moved;
+// the files before it are then in place.
 // Sets *seconds to the time spent on encoding and writing, even if other work ran at the same time.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);
 void image_output_abandon(ImageOutput *output);
