@@ -40,7 +40,7 @@ WRONG_COMMAND_LINES = [
     ('--tone: .*"flimic".*did you mean filmic', "render sphere.yaml --tone flimic"),
     ("--exposure: expected", "render sphere.yaml --exposure {bright|1x|65|-65|nan|''}"),
     ("EXR and NPY hold linear", "render sphere.yaml -o a.{exr|npy} {--tone filmic|--exposure -1|--dither}"),
-    ("--dither is for 8 bits", "render sphere.yaml --dither --bits 16"),
+    ("--dither cannot be combined with --bits 16", "render sphere.yaml --dither --bits 16"),
     ('--transfer: .*"srbg".*did you mean srgb', "render sphere.yaml --transfer srbg"),
     ('--timing: .*"jsn".*did you mean json', "render sphere.yaml --timing=jsn"),
     ('--aov: .*"nromal".*did you mean normal', "render sphere.yaml --aov t,nromal"),

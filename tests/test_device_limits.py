@@ -132,7 +132,7 @@ class DeviceLimits(TestCase):
         limited = two | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": "no-double", "GLINT_LIMITED": basic}
         self.assertEqual([device["fp64"] for device in self.json("devices --json", env=limited)["devices"]], [False, True])
         self.glint(f"render {mirrors} {certified} --device {pthread} -o one.npy", env=limited)
-        chosen = f'^glint: "{pthread}.*" works in double for "{basic}.*", which has no 64-bit floating point$'
+        chosen = f'^glint: "{pthread}.*" computes in double for "{basic}.*", which has no 64-bit floating point$'
         for option, message in ("", chosen), (f"--reference-device {pthread}", "^$"), ("--reference-device 1", "^$"):
             process = self.glint(f"render {mirrors} {certified} --device {basic} {option} -o image.npy", env=limited)
             self.assertRegex(process.stderr, re.compile(message, re.MULTILINE))
@@ -178,7 +178,7 @@ class DeviceLimits(TestCase):
         if not IS_LONG:  # Mesa 22.3 compiles this kernel for four minutes
             return
         process = self.glint(f"{command} --device {devices['rusticl']['index']} -o image.npy", env=env)
-        self.assertRegex(process.stderr, '" works in double for "llvmpipe.* RUSTICL_FEATURES is fp64')
+        self.assertRegex(process.stderr, '" computes in double for "llvmpipe.* RUSTICL_FEATURES is fp64')
         self.glint(f"{command} -o one.npy", env=POCL)
         self.assertSameBytes("image.npy", "one.npy")
 

@@ -96,7 +96,7 @@ static bool reference_read(Accuracy *accuracy)
     Image image;
     const ImageReadOptions reading = {.max_pixels = accuracy->options.variants.common.scene.max_pixels};
     if (!image_read(&image, path, &reading, &accuracy->messages)) return false;
-    const char *fault = image.display ? "display values; linear light is needed, of an .exr or .npy"
+    const char *fault = image.display ? "display values; it must hold linear light, as in an .exr or .npy"
                         : image.data || image.channels != 3 ? "no colors"
                                                             : NULL;
     if (fault) message_error(&accuracy->messages, "the reference '%s' holds %s", path, fault);

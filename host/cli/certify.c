@@ -74,8 +74,10 @@ static void certified_print(const CertifyErrors *errors, const CertifyUncertifie
     printf("             colors are certified to %.2g of their largest channel, or of 1 if that is more\n",
            CERTIFIED_COLOR_ERROR);
     if (errors->unconfirmed > 0)
-        printf("             %zu pixels decided that the reference leaves uncertain; %zu differ from it\n",
-               errors->unconfirmed, errors->contradicted);
+        printf("             certified decides %zu pixel%s that the reference leaves uncertain; %zu of them "
+               "differ "
+               "from it\n",
+               errors->unconfirmed, text_plural(errors->unconfirmed), errors->contradicted);
     if (uncertified->count == 0) return;
     printf(
         "             %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "

@@ -88,7 +88,7 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
     messages_print(&messages, NULL);
     if (!reference) return !selector;
     if (!selector)
-        fprintf(stderr, "glint: \"%s\" works in double for \"%s\", which has no 64-bit floating point%s\n",
+        fprintf(stderr, "glint: \"%s\" computes in double for \"%s\", which has no 64-bit floating point%s\n",
                 reference->name, device->name, device_fp64_hint(device));
     if (reference != device) compute_open_reference(compute, reference);
     return true;

@@ -240,16 +240,19 @@ static int time_render(ImageRender *render)
 // Returns false with a message if an option does not work with the shutter's several times.
 static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
 {
-    const char *const obstacle = shutter->time_count == 1    ? NULL
-                                 : options->checkpoint       ? "--checkpoint keeps bands of one time"
-                                 : options->budget.limit > 0 ? "--max-error measures one time"
-                                 : image_output_aovs(&options->output) & AOVS_OF_SAMPLES
-                                     ? "--alpha, coverage and backdrop are of one time"
-                                 : strcmp(options->scene, "-") == 0 ? "standard input is read once"
+    const bool has_aov = image_output_aovs(&options->output) & AOVS_OF_SAMPLES;
+    const char *const obstacle = shutter->time_count == 1           ? NULL
+                                 : options->checkpoint              ? "--checkpoint"
+                                 : options->budget.limit > 0        ? "--max-error"
+                                 : has_aov                          ? "--alpha or --aov coverage,backdrop"
+                                 : strcmp(options->scene, "-") == 0 ? "standard input"
                                                                     : NULL;
     if (obstacle)
-        fprintf(stderr, "glint: '%s': %s, but 'shutter' needs several; --set shutter=0 closes it\n",
-                options->scene, obstacle);
+        fprintf(
+            stderr,
+            "glint: '%s': %s cannot be combined with an open shutter, which renders the scene several times; "
+            "--set shutter=0 closes it\n",
+            options->scene, obstacle);
     if (shutter->is_open && options->sample_count == 1)
         fprintf(stderr,
                 "glint: warning: '%s': 'shutter' has no effect at --samples 1, since each sample shows one "

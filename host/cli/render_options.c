@@ -109,8 +109,7 @@ static const char *display_check(const RenderOptions *options)
         return "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values";
     if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
         return "--alpha is for PNG and EXR; other formats need --aov coverage,backdrop";
-    if (output->dither && output->bits != 8)
-        return "--dither is for 8 bits; it cannot be combined with --bits 16";
+    if (output->dither && output->bits != 8) return "--dither cannot be combined with --bits 16";
     return NULL;
 }
 

@@ -104,7 +104,7 @@ static void pilot_print(const Pilot *pilot)
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot->candidates[i];
         if (candidate->status != PILOT_MEASURED) continue;
-        fprintf(stderr, "    %-9s %9.3g ns a pixel", precision_names[i], 1e9 * candidate->pixel_seconds);
+        fprintf(stderr, "    %-9s %9.3g ns per pixel", precision_names[i], 1e9 * candidate->pixel_seconds);
         if (i != PRECISION_DOUBLE)
             fprintf(stderr, ", %s %.2g in the sample; bound %.2g: %s",
                     error_metric_names[pilot->budget.metric], candidate->verdict.error,
