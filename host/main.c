@@ -4,6 +4,7 @@
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
+#include "host/cli/command_line.h"
 #include "host/cli/commands.h"
 #include "host/cli/interrupts.h"
 #include "host/import/load.h"
@@ -48,10 +49,9 @@ static void program_start(const char *name, char **arguments)
     char *program = text_format("glint-%s", name);
     execvp(program, arguments);
     // EACCES may come from a folder of the PATH that cannot be searched
-    if (errno != ENOENT && errno != EACCES)
-        fprintf(stderr, "glint: cannot start %s: %s\n", program, strerror(errno));
+    if (errno != ENOENT && errno != EACCES) stderr_print("cannot start %s: %s", program, strerror(errno));
     if (strcmp(name, "locate") == 0)
-        fputs("glint: glint locate needs glint's Python package with the extra [locate]\n", stderr);
+        stderr_print("glint locate needs glint's Python package with the extra [locate]");
     free(program);
 }
 
@@ -88,9 +88,8 @@ static int command_run(int argument_count, char **arguments)
     }
     program_start(name, arguments + 1);
     const char *near = text_nearest(name, names, COMMAND_COUNT);
-    fprintf(stderr, "glint: unknown command \"%s\"", name);
-    if (near) fprintf(stderr, "; did you mean %s?", near);
-    fputc('\n', stderr);
+    stderr_print("unknown command \"%s\"%s%s%s", name, near ? "; did you mean " : "", near ? near : "",
+                 near ? "?" : "");
     return EXIT_USER;
 }
 
@@ -108,6 +107,6 @@ int main(int argument_count, char **arguments)
         fault_output_is_complete(status);
         return status;
     }
-    fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
+    stderr_print("cannot write the standard output: %s", strerror(errno));
     return EXIT_MACHINE;
 }

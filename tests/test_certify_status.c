@@ -89,14 +89,14 @@ TEST(status)
         one = fails[i];
         const ChildEnd end = child_run(certify, &one, sizeof one);
         assert_int_equal(end.status, EXIT_CHECK);
-        assert_non_null(strstr(end.errors, "glint certify: certified is wrong at 1 "));
+        assert_non_null(strstr(end.errors, "glint: certified is wrong at 1 "));
         assert_non_null(strstr(end.errors, " at 7,5:"));
     }
     for (size_t i = 0; i < COUNT_OF(mirrored); i++) {
         one = mirrored[i];
         const ChildEnd end = child_run(certify, &one, sizeof one);
         assert_int_equal(end.status, EXIT_CHECK);
-        assert_non_null(strstr(end.errors, "glint certify: certified is wrong at "));
+        assert_non_null(strstr(end.errors, "glint: certified is wrong at "));
     }
     for (size_t i = 0; i < COUNT_OF(passing); i++) {
         one = passing[i];

@@ -309,7 +309,7 @@ static int accuracy_run(Accuracy *accuracy)
     if (report_has_document(options) && !report_write(accuracy_json(report), options)) return EXIT_USER;
     if (!page_commit(accuracy)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
-    fputs("glint accuracy: no variant could be rendered\n", stderr);
+    stderr_print("no variant could be rendered");
     return EXIT_USER;
 }
 

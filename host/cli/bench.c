@@ -68,8 +68,7 @@ static bool words_read(VariantOptions *variant, char **words, int count)
     if (command_line_read(&variant_line, &line, count, words) != OPTIONS_READ) return false;
     *variant = line.options;
     if (line.operands.count == 0) return true;
-    fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", line.operands.items[0]);
-    return false;
+    return stderr_print("--variant: expected options, not \"%s\"", line.operands.items[0]);
 }
 
 static bool variant_read(BenchOptions *options, size_t index)
@@ -84,9 +83,9 @@ static bool variant_read(BenchOptions *options, size_t index)
     words[0] = name;
     int count = 1;
     const bool is_split = words_split(options->variant_words[index], words, &count);
-    if (!is_split) fputs("glint: --variant: a quote is not closed\n", stderr);
+    if (!is_split) stderr_print("--variant: a quote is not closed");
     const bool is_valid = is_split && words_read(variant, words, count);
-    if (!is_valid) fprintf(stderr, "glint: the error is in --variant \"%s\"\n", text);
+    if (!is_valid) stderr_print("the error is in --variant \"%s\"", text);
     free(words);
     return is_valid;
 }
@@ -98,10 +97,8 @@ static bool variants_read(const Option *option, void *bench_options)
     (void)option;
     for (size_t i = 0; i < options->variant_texts.count; i++) {
         for (size_t k = 0; k < i; k++)
-            if (strcmp(options->variant_texts.items[i], options->variant_texts.items[k]) == 0) {
-                fprintf(stderr, "glint: --variant \"%s\" is given twice\n", options->variant_texts.items[i]);
-                return false;
-            }
+            if (strcmp(options->variant_texts.items[i], options->variant_texts.items[k]) == 0)
+                return stderr_print("--variant \"%s\" is given twice", options->variant_texts.items[i]);
         if (!variant_read(options, i)) return false;
     }
     return true;
@@ -199,12 +196,11 @@ static void baseline_warn(const Baseline *baseline, const Device *device)
     struct utsname host = {0};
     uname(&host);
     if (strcmp(baseline->device, device->name) != 0)
-        fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
-                baseline->device);
+        stderr_print("the baseline was measured on another device, \"%s\"", baseline->device);
     else if (board[0] != '\0' && strcmp(board, device->board) != 0)
-        fprintf(stderr, "glint bench: the baseline was measured on another board, \"%s\"\n", board);
+        stderr_print("the baseline was measured on another board, \"%s\"", board);
     if (strcmp(baseline->host, host.nodename) != 0)
-        fprintf(stderr, "glint bench: the baseline was measured on another host, \"%s\"\n", baseline->host);
+        stderr_print("the baseline was measured on another host, \"%s\"", baseline->host);
 }
 
 static int bench_print(const Bench *bench, const Baseline *baseline)
@@ -224,7 +220,7 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
     int status = EXIT_DONE;
     if (report_has_document(format) && !report_write(bench_json(&report), format)) status = EXIT_USER;
     if (!variant_set_any_measured(set)) {
-        fputs("glint bench: no row could be measured\n", stderr);
+        stderr_print("no row could be measured");
         status = EXIT_USER;
     } else if (baseline) {
         baseline_warn(baseline, device);

@@ -71,8 +71,7 @@ static int worker_close(MeasuredProgram *worker)
         while (waitpid(worker->process, &ended, 0) < 0 && errno == EINTR)
             continue;
         status = WIFEXITED(ended) ? WEXITSTATUS(ended) : EXIT_MACHINE;
-        if (WIFSIGNALED(ended))
-            fprintf(stderr, "glint bench: '%s' was ended by signal %d\n", worker->program, WTERMSIG(ended));
+        if (WIFSIGNALED(ended)) stderr_print("'%s' was ended by signal %d", worker->program, WTERMSIG(ended));
     }
     if (worker->errors) {
         char line[512];
@@ -109,7 +108,7 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
     free(arguments);
     if (error) {
         worker->process = 0;
-        fprintf(stderr, "glint bench: cannot run '%s': %s\n", worker->program, strerror(error));
+        stderr_print("cannot run '%s': %s", worker->program, strerror(error));
     }
     return !error;
 }
@@ -131,8 +130,7 @@ static bool worker_greets(MeasuredProgram *worker, size_t row_count)
     snprintf(expected, sizeof expected, greeting, row_count);
     if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
     if (!worker_is_interrupted(worker))
-        fprintf(stderr, "glint bench: '%s' does not answer as a glint with bench --against does\n",
-                worker->program);
+        stderr_print("'%s' does not answer as a glint with bench --against does", worker->program);
     return false;
 }
 
@@ -142,7 +140,7 @@ static bool worker_open(MeasuredProgram *worker, const char *program, const Agai
     *worker = (MeasuredProgram){.program = program, .errors = tmpfile()};
     int to[2] = {-1, -1}, from[2] = {-1, -1};
     bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0;
-    if (!ready) fprintf(stderr, "glint bench: cannot run '%s': %s\n", program, strerror(errno));
+    if (!ready) stderr_print("cannot run '%s': %s", program, strerror(errno));
     bool spawned = ready && worker_spawn(worker, against->options, to, from);
     if (to[0] >= 0) close(to[0]);
     if (from[1] >= 0) close(from[1]);
@@ -174,8 +172,7 @@ static bool worker_run(MeasuredProgram *worker, double *seconds, size_t row_coun
     fputc('\n', worker->requests);
     fflush(worker->requests);
     bool whole = reply_read(worker->replies, seconds, row_count);
-    if (!whole && !worker_is_interrupted(worker))
-        fprintf(stderr, "glint bench: '%s' exited early\n", worker->program);
+    if (!whole && !worker_is_interrupted(worker)) stderr_print("'%s' exited early", worker->program);
     return whole;
 }
 

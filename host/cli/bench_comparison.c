@@ -1,6 +1,7 @@
 #include "host/cli/bench_comparison.h"
 
 #include "host/base/exit_status.h"
+#include "host/cli/command_line.h"
 #include "host/cli/report_json.h"
 #include <math.h>
 
@@ -56,17 +57,16 @@ int comparisons_status(const RowComparison *comparisons, size_t count, const cha
         counts[comparisons[i].verdict]++;
     }
     if (compared == 0) {
-        fprintf(stderr, "glint bench: %s has none of these rows\n", other);
+        stderr_print("%s has none of these rows", other);
         return EXIT_USER;
     }
     if (counts[VERDICT_SLOWER] > 0) {
-        fprintf(stderr, "glint bench: %zu of %zu rows are slower than %s\n", counts[VERDICT_SLOWER], compared,
-                other);
+        stderr_print("%zu of %zu rows are slower than %s", counts[VERDICT_SLOWER], compared, other);
         return EXIT_CHECK;
     }
     if (counts[VERDICT_UNDECIDED] > 0) {
-        fprintf(stderr, "glint bench: too noisy to compare %zu of %zu rows with %s\n",
-                counts[VERDICT_UNDECIDED], compared, other);
+        stderr_print("too noisy to compare %zu of %zu rows with %s", counts[VERDICT_UNDECIDED], compared,
+                     other);
         return EXIT_UNDECIDED;
     }
     return EXIT_DONE;

@@ -198,13 +198,11 @@ static int precision_compare(Certification *certification, RenderSettings settin
 static int decided_check(const CertifyErrors *certified)
 {
     if (certified->wrong_decided == 0) return EXIT_DONE;
-    fprintf(stderr,
-            "glint certify: certified is wrong at %zu pixel%s that it does not list as uncertified, most at "
-            "%u,%u: "
-            "%.2g of the distance\n",
-            certified->wrong_decided, text_plural(certified->wrong_decided),
-            certified->wrong_decided_place[0], certified->wrong_decided_place[1],
-            certified->wrong_decided_margin);
+    stderr_print("certified is wrong at %zu pixel%s that it does not list as uncertified, most at %u,%u: "
+                 "%.2g of the distance",
+                 certified->wrong_decided, text_plural(certified->wrong_decided),
+                 certified->wrong_decided_place[0], certified->wrong_decided_place[1],
+                 certified->wrong_decided_margin);
     return EXIT_CHECK;
 }
 
@@ -225,9 +223,8 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 {
     const char *unsupported = unsupported_feature(scene);
     if (unsupported) {
-        fprintf(stderr,
-                "glint certify: the exact reference does not support %s, so this scene cannot be certified\n",
-                unsupported);
+        stderr_print("the exact reference does not support %s, so this scene cannot be certified",
+                     unsupported);
         return EXIT_USER;
     }
     Compute *compute = &open->compute;

@@ -175,8 +175,7 @@ static bool object_print(const Scene *scene, const char *path, uint32_t id)
 {
     size_t primitive;
     if (!scene_find_object(scene, id, &primitive)) {
-        fprintf(stderr, "glint: --object: there is no object %u; the scene has %zu\n", id,
-                scene_primitive_count(scene));
+        stderr_print("--object: there is no object %u; the scene has %zu", id, scene_primitive_count(scene));
         return false;
     }
     Text text = {0};

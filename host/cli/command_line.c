@@ -27,6 +27,15 @@ void *option_field(const Option *option, void *options)
     return (char *)options + option->offset;
 }
 
+bool stderr_print(const char *format, ...)
+{
+    char *text;
+    ARGUMENTS_FORMAT(text, format);
+    fprintf(stderr, "glint: %s\n", text);
+    free(text);
+    return false;
+}
+
 bool option_fault(const Option *option, const char *value, const char *expected, ...)
 {
     va_list arguments;
@@ -54,10 +63,8 @@ bool option_text(const Option *option, const char *value, void *options)
 bool option_texts(const Option *option, const char *value, void *options)
 {
     OptionTexts *texts = option_field(option, options);
-    if (texts->count == OPTION_TEXTS_MAX) {
-        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, OPTION_TEXTS_MAX);
-        return false;
-    }
+    if (texts->count == OPTION_TEXTS_MAX)
+        return stderr_print("--%s: may be given at most %d times", option->name, OPTION_TEXTS_MAX);
     texts->items[texts->count++] = value;
     return true;
 }
@@ -164,7 +171,7 @@ bool option_list(const Option *option, const char *value, OptionReader *read, Op
         const size_t length = strcspn(at, ",");
         char *word = memory_copy_part(at, length);
         const bool fits = *list.count < list.most;
-        if (!fits) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, list.most);
+        if (!fits) stderr_print("--%s: expected at most %zu values", option->name, list.most);
         const bool is_read = fits && read(&item, word, (char *)list.items + *list.count * list.item_size);
         free(word);
         if (!is_read) return false;
@@ -197,14 +204,10 @@ bool option_set(const Option *option, const char *value, void *options)
 bool effect_folder(const Option *option, void *options)
 {
     const char *path = *(const char **)option_field(option, options);
-    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-        fprintf(stderr, "glint: --%s: cannot create the folder '%s': %s\n", option->name, path,
-                strerror(errno));
-        return false;
-    }
+    if (mkdir(path, 0777) != 0 && errno != EEXIST)
+        return stderr_print("--%s: cannot create the folder '%s': %s", option->name, path, strerror(errno));
     if (access(path, W_OK | X_OK) == 0) return true;
-    fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option->name, path, strerror(errno));
-    return false;
+    return stderr_print("--%s: cannot write to '%s': %s", option->name, path, strerror(errno));
 }
 
 bool effect_empty_folder(const Option *option, void *options)
@@ -212,16 +215,13 @@ bool effect_empty_folder(const Option *option, void *options)
     const char *path = *(const char **)option_field(option, options);
     if (!effect_folder(option, options)) return false;
     DIR *folder = opendir(path);
-    if (!folder) {
-        fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option->name, path,
-                strerror(errno));
-        return false;
-    }
+    if (!folder)
+        return stderr_print("--%s: cannot read the folder '%s': %s", option->name, path, strerror(errno));
     bool is_empty = true;
     for (const struct dirent *item; (item = readdir(folder));)
         is_empty &= strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0;
     closedir(folder);
-    if (!is_empty) fprintf(stderr, "glint: --%s: the folder '%s' is not empty\n", option->name, path);
+    if (!is_empty) stderr_print("--%s: the folder '%s' is not empty", option->name, path);
     return is_empty;
 }
 

@@ -132,5 +132,7 @@ bool digits_read(const char *value, const char **end, uint64_t *result);
 bool option_fault(const Option *option, const char *value, const char *expected, ...)
     __attribute__((format(printf, 3, 4)));
 
+// Prints a line to standard error, after "glint: ". Returns false, so that a function can return its error.
+bool stderr_print(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // Prints a usage error that points to --help. Returns false.
 bool option_usage_fault(const char *command, const char *what);

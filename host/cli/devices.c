@@ -118,7 +118,7 @@ static bool passports_find(const DeviceList *list, bool probes)
         compute_open(&compute, device);
         if (!passports_measure(&compute)) {
             char *failure = compute_failure_text(&compute);
-            fprintf(stderr, "glint: %s\n", failure);
+            stderr_print("%s", failure);
             free(failure);
             is_done = false;
         }

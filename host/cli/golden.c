@@ -294,7 +294,7 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
 {
     const size_t checked = options->scenes.count > 0 ? options->scenes.count : file->count;
     if (checked == 0) {
-        fprintf(stderr, "glint golden: '%s' has no lines\n", options->file);
+        stderr_print("'%s' has no lines", options->file);
         return EXIT_USER;
     }
     GoldenCheck *checks = memory_allocate_zeroed(checked + 1, sizeof *checks);

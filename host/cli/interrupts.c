@@ -2,9 +2,9 @@
 
 #include "host/base/array.h"
 #include "host/base/exit_status.h"
+#include "host/cli/command_line.h"
 #include <signal.h>
 #include <stddef.h>
-#include <stdio.h>
 #include <unistd.h>
 
 static volatile sig_atomic_t interrupted, is_flag_read, is_held;
@@ -86,7 +86,7 @@ bool is_interrupted(void)
 void interrupt_report(const char *consequence)
 {
     static bool is_reported;
-    if (!is_reported) fprintf(stderr, "glint: interrupted%s\n", consequence);
+    if (!is_reported) stderr_print("interrupted%s", consequence);
     is_reported = true;
 }
 

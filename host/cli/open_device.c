@@ -88,8 +88,8 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
     messages_print(&messages, NULL);
     if (!reference) return !selector;
     if (!selector)
-        fprintf(stderr, "glint: \"%s\" computes in double for \"%s\", which has no 64-bit floating point%s\n",
-                reference->name, device->name, device_fp64_hint(device));
+        stderr_print("\"%s\" computes in double for \"%s\", which has no 64-bit floating point%s",
+                     reference->name, device->name, device_fp64_hint(device));
     if (reference != device) compute_open_reference(compute, reference);
     return true;
 }
@@ -101,11 +101,11 @@ static ARRAY_OF(Compute) left;
 int compute_end(Compute *compute, int status)
 {
     char *unmap_failure = compute_unmap_failure_text(compute);
-    if (compute_ok(compute) && unmap_failure) fprintf(stderr, "glint: warning: %s\n", unmap_failure);
+    if (compute_ok(compute) && unmap_failure) stderr_print("warning: %s", unmap_failure);
     free(unmap_failure);
     if (!compute_ok(compute)) {
         char *failure = compute_failure_text(compute);
-        fprintf(stderr, "glint: %s\n", failure);
+        stderr_print("%s", failure);
         free(failure);
         status = EXIT_MACHINE;
     } else if (status != EXIT_INTERRUPTED) {

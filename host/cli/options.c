@@ -134,8 +134,7 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path)
 {
     if (!scene_was_read_from(scene, scene_path, path)) return false;
-    fprintf(stderr, "glint: would overwrite '%s', which '%s' is read from; choose another with -o\n", path,
-            scene_path);
+    stderr_print("would overwrite '%s', which '%s' is read from; choose another with -o", path, scene_path);
     return true;
 }
 

@@ -8,7 +8,6 @@
 #include "host/cli/interrupts.h"
 #include "host/cli/render_image.h"
 #include "host/import/load.h"
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -47,9 +46,8 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
     for (size_t i = 0; i < options->scenes.count; i++)
         for (size_t k = 0; k < i; k++) {
             if (strcmp(paths[i], paths[k]) != 0) continue;
-            fprintf(stderr, "glint render: the images of '%s' and '%s' would both be '%s'\n",
-                    options->scenes.items[k], options->scenes.items[i], paths[i]);
-            return false;
+            return stderr_print("the images of '%s' and '%s' would both be '%s'", options->scenes.items[k],
+                                options->scenes.items[i], paths[i]);
         }
     return true;
 }
@@ -116,7 +114,7 @@ static bool image_exists(const RenderOptions *options, const char *path)
     ImageOutputOptions output = options->output;
     output.path = path;
     if (!image_output_exists(&output)) return false;
-    if (!options->quiet) fprintf(stderr, "glint: kept %s\n", path);
+    if (!options->quiet) stderr_print("kept %s", path);
     return true;
 }
 

@@ -1,7 +1,6 @@
 #include "host/cli/render_devices.h"
 
 #include "host/base/memory.h"
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -44,7 +43,7 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
 void render_devices_drop(RenderDevices *open, size_t index)
 {
     char *failure = compute_failure_text(open->items[index].compute);
-    fprintf(stderr, "glint: warning: the other devices continue without it: %s\n", failure);
+    stderr_print("warning: the other devices continue without it: %s", failure);
     free(failure);
     open->items[index].is_dropped = true;
 }
@@ -63,8 +62,7 @@ static void unfit_print(MessageList *unfit)
 {
     for (size_t i = 0; i < unfit->count; i++)
         if (unfit->items[i].severity == MESSAGE_ERROR)
-            fprintf(stderr, "glint: warning: the other devices continue without it: %s\n",
-                    unfit->items[i].text);
+            stderr_print("warning: the other devices continue without it: %s", unfit->items[i].text);
     message_list_free(unfit);
 }
 

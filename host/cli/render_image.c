@@ -9,7 +9,6 @@
 #include "host/import/load.h"
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,9 +36,9 @@ static void estimate_print(ImageRender *render, double fraction_done)
     render->shutter.is_estimated = left >= 0;
     if (left < SECONDS_MIN) return;
     const double bytes = render->output ? image_output_bytes(render->output) : 0;
-    fprintf(stderr, "glint: %u x %u pixels: about %s%s%s\n", render->settings.region_width,
-            render->settings.region_height, text_duration(left).text, bytes > 0 ? " and at most " : "",
-            bytes > 0 ? text_size(bytes).text : "");
+    stderr_print("%u x %u pixels: about %s%s%s", render->settings.region_width,
+                 render->settings.region_height, text_duration(left).text, bytes > 0 ? " and at most " : "",
+                 bytes > 0 ? text_size(bytes).text : "");
 }
 
 static bool band_receive(void *context, const Film *band)
@@ -92,8 +91,8 @@ static void leftovers_print(const RenderOptions *options)
         interrupt_report(options->has_format ? ": the image on standard output is incomplete" : kept);
     free(kept);
     if (options->checkpoint)
-        fprintf(stderr, "glint: run the same command again to continue; finished bands are in '%s'\n",
-                options->checkpoint);
+        stderr_print("run the same command again to continue; finished bands are in '%s'",
+                     options->checkpoint);
 }
 
 // Adds the warnings of a complete image, or of one of its times.
@@ -174,7 +173,7 @@ static int image_render(ImageRender *render)
     messages_print_once(&render->messages, render->printed, NULL);
     if (!is_whole) leftovers_print(options);
     if (render->ranks && is_last && options->timing == TIMING_TRACE)
-        fprintf(stderr, "glint: --timing=trace covers only the first rank's devices\n");
+        stderr_print("--timing=trace covers only the first rank's devices");
     if (is_whole && is_last && options->timing != TIMING_NONE)
         timing_print(options->timing, &render->origin, render->times);
     return is_whole           ? EXIT_DONE
@@ -197,7 +196,7 @@ static int precision_choose(ImageRender *render, Pilot *pilot)
     if (options->quiet) return EXIT_DONE;
     Text line = {0};
     pilot_describe(&line, pilot);
-    fprintf(stderr, "glint: --max-error: %s, %.0f ms\n", text_c(&line), 1e3 * pilot->seconds);
+    stderr_print("--max-error: %s, %.0f ms", text_c(&line), 1e3 * pilot->seconds);
     text_free(&line);
     return EXIT_DONE;
 }
@@ -248,16 +247,13 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
                                  : strcmp(options->scene, "-") == 0 ? "standard input"
                                                                     : NULL;
     if (obstacle)
-        fprintf(
-            stderr,
-            "glint: '%s': %s cannot be combined with an open shutter, which renders the scene several times; "
-            "--set shutter=0 closes it\n",
+        stderr_print(
+            "'%s': %s cannot be combined with an open shutter, which renders the scene several times; "
+            "--set shutter=0 closes it",
             options->scene, obstacle);
     if (shutter->is_open && options->sample_count == 1)
-        fprintf(stderr,
-                "glint: warning: '%s': 'shutter' has no effect at --samples 1, since each sample shows one "
-                "time\n",
-                options->scene);
+        stderr_print("warning: '%s': 'shutter' has no effect at --samples 1: each sample shows one time",
+                     options->scene);
     return !obstacle;
 }
 
@@ -303,7 +299,7 @@ static int scene_render(ImageRender *render)
     const RenderOptions *options = render->options;
     RenderDevices *open = render->open;
     if (options->frame_count > 0 && !render->scene->animation.has_keys && !open->has_warned_of_frames)
-        fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options->scene);
+        stderr_print("warning: '%s' has no keys: all frames are alike", options->scene);
     open->has_warned_of_frames = true;
     stage_begin(render->times->stage, "opening the devices", NULL, 0);
     if (!render_devices_open(open, &options->common)) return EXIT_USER;

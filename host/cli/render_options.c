@@ -262,11 +262,9 @@ bool render_settings_make(RenderSettings *settings, RenderOptions *options, cons
     options->common.size[1] = settings->height;
     if (!options->has_region) return true;
     const uint32_t *region = options->region;
-    if (region[0] + region[2] > settings->width || region[1] + region[3] > settings->height) {
-        fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the image of %ux%u pixels\n",
-                region[0], region[1], region[2], region[3], settings->width, settings->height);
-        return false;
-    }
+    if (region[0] + region[2] > settings->width || region[1] + region[3] > settings->height)
+        return stderr_print("--region: %u,%u,%u,%u does not lie within the image of %ux%u pixels", region[0],
+                            region[1], region[2], region[3], settings->width, settings->height);
     settings->region_x = region[0];
     settings->region_y = region[1];
     settings->region_width = region[2];

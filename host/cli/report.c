@@ -169,7 +169,7 @@ static char *steps_folder_create(void)
     const char *parent = getenv("TMPDIR");
     char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
     if (mkdtemp(folder)) return folder;
-    fprintf(stderr, "glint report: cannot create the folder '%s': %s\n", folder, strerror(errno));
+    stderr_print("cannot create the folder '%s': %s", folder, strerror(errno));
     free(folder);
     return NULL;
 }

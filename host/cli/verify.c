@@ -245,10 +245,9 @@ static void precision_verify(Verification *verification, Compute *compute)
     if (!record->is_started) {
         record->start_seconds = clock_seconds();
         if (tier == TIER_D && QUAD_BITS < 64)
-            fprintf(stderr,
-                    "glint: verify: the reference has %d bits here: tier D is checked against numbers of the "
-                    "precision that it tests\n",
-                    QUAD_BITS);
+            stderr_print("the reference has %d bits here: tier D is checked against numbers of the "
+                         "precision that it tests",
+                         QUAD_BITS);
         text_print(verification, "%s\n", precision_names[verification->precision]);
         record->is_started = true;
     }
@@ -318,8 +317,8 @@ static int device_verify(Verification *verification, Compute *compute)
     Precision last = options->common.has_precision ? options->common.settings.precision : PRECISION_DOUBLE;
     if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
         if (options->common.has_precision) {
-            fprintf(stderr, "glint: precision double: the device \"%s\" has no 64-bit floating point\n",
-                    compute->device->name);
+            stderr_print("precision double: the device \"%s\" has no 64-bit floating point",
+                         compute->device->name);
             return EXIT_USER;
         }
         last = PRECISION_STRICT;

@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/exit_status.h"
+#include "host/cli/command_line.h"
 #include "host/cli/interrupts.h"
 #include <errno.h>
 #include <signal.h>
@@ -70,7 +71,7 @@ int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void
         fflush(stdout); // otherwise each process would print the contents of the buffer
         const pid_t child = fork();
         if (child < 0) {
-            fprintf(stderr, "glint: verify: cannot start a process: %s\n", strerror(errno));
+            stderr_print("cannot start a process: %s", strerror(errno));
             return EXIT_MACHINE;
         }
         if (child == 0) {
@@ -88,7 +89,7 @@ int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void
             WIFEXITED(status) && (journal->is_ended || (!running && WEXITSTATUS(status) == EXIT_MACHINE));
         if (!has_status) crash_describe(journal, status);
         if (journal->is_ended || !running) {
-            if (journal->crash[0] != '\0') fprintf(stderr, "glint: %s\n", journal->crash);
+            if (journal->crash[0] != '\0') stderr_print("%s", journal->crash);
             return has_status ? WEXITSTATUS(status) : EXIT_MACHINE;
         }
         crash_record(journal, running);

@@ -24,9 +24,9 @@ static bool camera_file_check(const Option *option, void *view_options)
     const char *camera = options->common.scene.camera ? options->common.scene.camera : options->scene;
     const bool is_stdin = strcmp(camera, "-") == 0;
     if (is_stdin)
-        fprintf(stderr, "glint: --%s: standard input cannot be written; name a YAML file\n", option->name);
+        stderr_print("--%s: standard input cannot be written; name a YAML file", option->name);
     else if (!scene_is_yaml(camera))
-        fprintf(stderr, "glint: --%s: '%s' is not in YAML\n", option->name, camera);
+        stderr_print("--%s: '%s' is not in YAML", option->name, camera);
     return !is_stdin && scene_is_yaml(camera);
 }
 

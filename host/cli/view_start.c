@@ -3,10 +3,10 @@
 #include "host/base/exit_status.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/cli/command_line.h"
 #include "host/cli/commands.h"
 #include <errno.h>
 #include <limits.h>
-#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -16,8 +16,7 @@ int command_view(int argument_count, char **arguments)
     char self[PATH_MAX];
     const ssize_t read = readlink("/proc/self/exe", self, sizeof self);
     if (read < 0 || read == sizeof self) {
-        fprintf(stderr, "glint: cannot find its own program: %s\n",
-                strerror(read < 0 ? errno : ENAMETOOLONG));
+        stderr_print("cannot find its own program: %s", strerror(read < 0 ? errno : ENAMETOOLONG));
         return EXIT_MACHINE;
     }
     size_t length = (size_t)read;
@@ -33,6 +32,6 @@ int command_view(int argument_count, char **arguments)
     for (int i = 1; i <= argument_count; i++)
         passed[i + 1] = arguments[i];
     execv(text_c(&path), passed);
-    fprintf(stderr, "glint: cannot start %s: %s\n", text_c(&path), strerror(errno));
+    stderr_print("cannot start %s: %s", text_c(&path), strerror(errno));
     return EXIT_MACHINE;
 }
