@@ -91,7 +91,9 @@ static void pick_append(Text *text, const AccuracyScene *scene, const AccuracyRe
     if (objects > 0)
         text_appendf(text, "; %zu pixel%s at silhouettes show%s another object", objects,
                      text_plural(objects), objects == 1 ? "s" : "");
-    if (shadows > 0) text_appendf(text, "; %zu wrong at the edges of shadows", shadows);
+    if (shadows > 0)
+        text_appendf(text, "; %zu shadow%s wrong at %s", shadows, shadows == 1 ? " is" : "s are",
+                     shadows == 1 ? "its edge" : "their edges");
 }
 
 Text accuracy_pick_sentence(const AccuracyScene *scene, size_t pick)
