@@ -100,13 +100,5 @@ int main(int argument_count, char **arguments)
     signals_prepare();
     interrupts_catch();
     fault_catch_crashes();
-    int status = command_run(argument_count, arguments);
-    if (status == EXIT_INTERRUPTED) interrupt_report("");
-    // a truncated report must not exit with success
-    if (fflush(stdout) == 0 && !ferror(stdout)) {
-        fault_output_is_complete(status);
-        return status;
-    }
-    stderr_print("cannot write the standard output: %s", strerror(errno));
-    return EXIT_MACHINE;
+    return command_finish(command_run(argument_count, arguments));
 }

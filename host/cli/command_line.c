@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/cli/interrupts.h"
 #include "host/image/image.h"
 #include "host/scene/scene.h"
 #include <assert.h>
@@ -25,6 +26,18 @@ static const Option help_option[] = {{"help", NULL, "print this help", NULL, .le
 void *option_field(const Option *option, void *options)
 {
     return (char *)options + option->offset;
+}
+
+int command_finish(int status)
+{
+    if (status == EXIT_INTERRUPTED) interrupt_report("");
+    // a truncated report must not exit with success
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        stderr_print("cannot write the standard output: %s", strerror(errno));
+        return EXIT_MACHINE;
+    }
+    fault_output_is_complete(status);
+    return status;
 }
 
 bool stderr_print(const char *format, ...)

@@ -8,7 +8,6 @@
 #include "host/cli/render.h"
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -272,7 +271,5 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
     broadcast(&none, sizeof none, MPI_COMM_WORLD);
     free(ranks.items);
     free(ranks.remote.shares);
-    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
-    fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
-    return EXIT_MACHINE;
+    return command_finish(status);
 }
