@@ -127,8 +127,8 @@ static void worst_json(Json *json, AccuracyMeasure measure, const AccuracyWorst 
     json_number(json, "error", worst->error);
     if (measure != ACCURACY_NORMAL)
         json_addf(json, "reference %g variant %g", worst->reference, worst->variant);
-    numbers_json(json, "reference_color", worst->reference_color, 3);
-    numbers_json(json, "variant_color", worst->variant_color, 3);
+    numbers_json(json, "reference_color", 1, worst->reference_color, 3);
+    numbers_json(json, "variant_color", 1, worst->variant_color, 3);
     json_end(json);
 }
 

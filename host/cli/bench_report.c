@@ -209,10 +209,7 @@ static void launches_json(Json *json, const RenderReport *report)
 
 void samples_json(Json *json, const char *key, const Series *seconds)
 {
-    json_begin_array(json, key);
-    for (size_t i = 0; i < seconds->count; i++)
-        json_number(json, NULL, 1e3 * seconds->items[i]);
-    json_end(json);
+    numbers_json(json, key, 1e3, seconds->items, seconds->count);
 }
 
 Json *bench_json_open(const Device *device)

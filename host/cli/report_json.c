@@ -73,11 +73,11 @@ void counts_json(Json *json, const char *key, const size_t *counts, size_t count
     json_end(json);
 }
 
-void numbers_json(Json *json, const char *key, const double *numbers, size_t count)
+void numbers_json(Json *json, const char *key, double scale, const double *numbers, size_t count)
 {
     json_begin_array(json, key);
     for (size_t i = 0; i < count; i++)
-        json_number(json, NULL, numbers[i]);
+        json_number(json, NULL, scale * numbers[i]);
     json_end(json);
 }
 

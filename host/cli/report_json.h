@@ -19,7 +19,7 @@ void figure_json(Json *json, const char *key, double scale, Figure figure);
 // Adds the board, the place on the PCI bus and the UUID, each of which is null if unknown.
 void device_identity_json(Json *json, const Device *device);
 void counts_json(Json *json, const char *key, const size_t *counts, size_t count);
-void numbers_json(Json *json, const char *key, const double *numbers, size_t count);
+void numbers_json(Json *json, const char *key, double scale, const double *numbers, size_t count);
 void ratio_json(Json *json, const Comparison *comparison);    // adds ratio, low and high
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0
 // Adds all options that the kernels of a report were compiled with.
