@@ -32,6 +32,33 @@ TEST(takes_a_veils_light_once)
     }
 }
 
+// A filter's blocked channels stay black, whether it is tested before or after another transparent object.
+TEST(blocked_channels_stay_black_in_any_order)
+{
+    for (int filter = 0; filter < 2; filter++) {
+        OwnedScene scene = scene_of_text(
+            "filter.yaml",
+            formatted("camera: {position: [0, 9, 0.01], look_at: [0, 0, 0], up: [0, 0, 1], fov: 5}\n"
+                      "background: [0, 0, 0]\nambient: [0, 0, 0]\n"
+                      "lights: [{point: {position: [3, 6, 0], color: [16, 16, 16]}}]\n"
+                      "materials:\n"
+                      "  filter: {diffuse: 0, transmission: [1, 0, 0.5], ior: 1}\n"
+                      "  clear: {diffuse: 0, transmission: 0.5, ior: 1}\n"
+                      "objects:\n"
+                      "  - box: {min: [-8, -1, -8], max: [8, 0, 8]}\n"
+                      "  - disc: {center: [1.5, 3, 0], normal: [0, 1, 0], radius: 1, material: %s}\n"
+                      "  - disc: {center: [2, 4, 0], normal: [0, 1, 0], radius: 1, material: %s}\n",
+                      filter == 0 ? "filter" : "clear", filter == 1 ? "filter" : "clear"));
+        RenderSettings settings = film_settings(8, 8, PRECISION_SINGLE);
+        settings.bvh = BVH_OFF;
+        OwnedFilm film = film_render(&probe_compute, &scene, &settings, 0);
+        for (size_t i = 0; i < film_pixel_count(&film); i++) {
+            assert_true(film.color[3 * i] > 0 && film.color[3 * i + 2] > 0);
+            assert_true(film.color[3 * i + 1] == 0);
+        }
+    }
+}
+
 // Squares of distances to the light times squares of sizes are beyond a float's range.
 TEST(darkens_an_eclipse_in_meters)
 {

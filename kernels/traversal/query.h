@@ -64,7 +64,8 @@ static inline integer optical_depth_steps(uint4 steps)
 static inline integer optical_depth_sum(integer sum, integer added)
 {
     const integer opaque = (integer)(OPTICAL_DEPTH_MAX);
-    integer largest = lanes_select(added < opaque, (integer)(OPTICAL_DEPTH_PASSING), opaque);
+    integer largest =
+        lanes_select((added < opaque) & (sum < opaque), (integer)(OPTICAL_DEPTH_PASSING), opaque);
     return lanes_select(sum < largest - added, sum + added, largest);
 }
 
