@@ -117,7 +117,8 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     integer events = lanes_select(reflected, (integer)(PATH_REFLECTED), none) |
                      lanes_select(refracted, (integer)(PATH_REFRACTED), none) |
                      lanes_select(reflected & bounces->total, (integer)(PATH_TOTAL_REFLECTION), none);
-    unsigned_integer word = unsigned_from_integer((object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
+    unsigned_integer word = unsigned_from_integer(object + (integer)(1)) * (unsigned_integer)(PATH_EVENTS) +
+                            unsigned_from_integer(events);
     unsigned_integer longer =
         ((path ^ word) * (unsigned_integer)(PATH_FACTOR)) & (unsigned_integer)(0xffffffffu);
     return lanes_select(ray->active, longer, path);
