@@ -21,14 +21,14 @@ static inline real real_turns(real x, real y)
 {
     real along = fabs(x), across = fabs(y);
     real larger = real_max(along, across), smaller = real_min(along, across);
-    real tangent = real_divide(smaller, lanes_select(larger == (real)(0), (real)(1), larger));
+    real tangent = real_divide(smaller, lanes_select(larger == 0, (real)(1), larger));
     for (uint halving = 0; halving < 2; halving++)
-        tangent = real_divide(tangent, (real)(1) + real_sqrt(real_fma(tangent, tangent, (real)(1))));
+        tangent = real_divide(tangent, 1 + real_sqrt(real_fma(tangent, tangent, (real)(1))));
     real squared = tangent * tangent, series = series_of_odd_reciprocals(-squared, 25);
-    real turns = real_fma(-(tangent * squared), series, tangent) * (real)(INVERSE_QUARTER_TURN);
-    turns = lanes_select(across > along, (real)(0.25f) - turns, turns);
-    turns = lanes_select(x < (real)(0), (real)(0.5f) - turns, turns);
-    return lanes_select(y < (real)(0), -turns, turns);
+    real turns = real_fma(-(tangent * squared), series, tangent) * INVERSE_QUARTER_TURN;
+    turns = lanes_select(across > along, 0.25f - turns, turns);
+    turns = lanes_select(x < 0, 0.5f - turns, turns);
+    return lanes_select(y < 0, -turns, turns);
 }
 
 // Returns the sine of an angle in turns, -1/4 to 1/4, by Taylor's series up to a^21 / 21! (Abramowitz,
@@ -40,7 +40,7 @@ static inline real real_sine_of_turns(real turns)
 #else
 #define ONE 1.0f
 #endif
-    const real angle = turns * (real)(TURN), squared = angle * angle;
+    const real angle = turns * TURN, squared = angle * angle;
     real series = (real)(1);
     // The factor from a term to the next one, from literals, since a device's quotients may be inexact.
 #define SERIES_STEP(n) series = real_fma(-squared * (real)(ONE / n), series, (real)(1))
@@ -54,7 +54,7 @@ static inline real real_sine_of_turns(real turns)
     SERIES_STEP(42);
     SERIES_STEP(20);
 #undef SERIES_STEP
-    return real_fma(-angle * squared * (real)(ONE / 6), series, angle);
+    return real_fma(-angle * squared * (ONE / 6), series, angle);
 #undef ONE
 }
 
@@ -64,7 +64,7 @@ static inline Vector vector_of_turns(Vector forward, Vector right, real turns)
 {
     const real quarter = (real)(0.25f), half_turn = (real)(0.5f);
     real away = fabs(turns), sine = real_sine_of_turns(real_min(away, half_turn - away));
-    return vector_fma(right, lanes_select(turns < (real)(0), -sine, sine),
+    return vector_fma(right, lanes_select(turns < 0, -sine, sine),
                       vector_scale(forward, real_sine_of_turns(quarter - away)));
 }
 

@@ -17,7 +17,7 @@
 // from the midpoint of two floats.
 static inline mask float_is_normal(real a)
 {
-    return (fabs(a) >= (real)(0x1p-126f)) & (fabs(a) <= (real)(LARGEST));
+    return (fabs(a) >= 0x1p-126f) & (fabs(a) <= LARGEST);
 }
 
 static inline real real_power_of_two(integer exponent)
@@ -41,7 +41,7 @@ static inline real repaired_quotient(real a, real b)
     b = real_from_bits((b_bits & MANTISSA) | one);
     real quotient = device_divide(a, b);
     quotient = real_fma(real_fma(-quotient, b, a), device_divide((real)(1), b), quotient);
-    real residual = real_fma(-quotient, b, a), half_b = (real)(0.5f) * b;
+    real residual = real_fma(-quotient, b, a), half_b = 0.5f * b;
     real up = real_neighbor(quotient, 1), down = real_neighbor(quotient, -1);
     mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
@@ -64,7 +64,7 @@ static inline real repaired_root(real a)
     real root = device_sqrt(a);
     root = real_fma(real_fma(-root, root, a), device_divide((real)(0.5f), root), root);
     real up = real_neighbor(root, 1), down = real_neighbor(root, -1);
-    mask rises = real_fma(-root, up, a) > (real)(0), falls = real_fma(-root, down, a) <= (real)(0);
+    mask rises = real_fma(-root, up, a) > 0, falls = real_fma(-root, down, a) <= 0;
     return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
 }
 
@@ -75,7 +75,7 @@ static inline real real_divide(real a, real b)
     real quotient = device_divide(a, b);
     if (!REPAIRS_DIVIDE) return quotient;
     real repaired = repaired_quotient(a, b);
-    mask ordinary = float_is_normal(a) & float_is_normal(b) & (fabs(repaired) >= (real)(0x1p-126f));
+    mask ordinary = float_is_normal(a) & float_is_normal(b) & (fabs(repaired) >= 0x1p-126f);
     return lanes_select(ordinary, repaired, quotient);
 }
 
@@ -117,7 +117,7 @@ static inline real hypotenuse_above(real a, real b)
 // x86 processors more than a hundred cycles.
 static inline mask quotient_is_bounded(real a, real b)
 {
-    return fabs(a) < fabs(b) * (real)(1 / SMALLEST_RATIO);
+    return fabs(a) < fabs(b) * (1 / SMALLEST_RATIO);
 }
 
 // Returns a / b, or `otherwise` if that is out of range.
@@ -232,12 +232,12 @@ static inline real series_of_odd_reciprocals(real x, scalar last)
 // all bits, which 1 - s would lose.
 static inline real real_log_complement(real s)
 {
-    real rest = (real)(1) - s;
+    real rest = 1 - s;
     // rest = 2^exponent m with m in [0.7, 1.4]; s <= 0.29 keeps exponent 0 and s itself
     integer exponent = (bits_from_real(rest) - (integer)(ROOT_HALF_BITS)) >> EXPONENT_SHIFT;
     real m = real_from_bits(bits_from_real(rest) - (exponent << EXPONENT_SHIFT));
-    real f = lanes_select(exponent == (integer)(0), -s, m - (real)(1));
-    real z = real_divide(f, (real)(2) + f);
+    real f = lanes_select(exponent == (integer)(0), -s, m - 1);
+    real z = real_divide(f, 2 + f);
     real zz = z * z, two_z = z + z;
     real log_m = real_fma(two_z * zz, series_of_odd_reciprocals(zz, 23), two_z);
     real k = real_from_integer(exponent);
@@ -279,7 +279,7 @@ static inline real real_complement_power(real s, real n)
 // Returns the lanes where (1 - s)^n, at most e^(-n s), may be above 0.
 static inline mask real_complement_power_is_nonzero(real s, real n)
 {
-    return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));
+    return (s < 1) & (n * s < 1 - EXP_LOWEST);
 }
 
 #endif

@@ -49,7 +49,7 @@ static inline real pair_round_to_odd(Pair sum)
 {
     integer bits = bits_from_real(sum.high);
     integer step = ((bits ^ bits_from_real(sum.low)) >> 31) | (integer)(1); // away from 0, or towards it
-    mask moves = (sum.low != (real)(0)) & ((bits & (integer)(1)) == (integer)(0));
+    mask moves = (sum.low != 0) & ((bits & (integer)(1)) == (integer)(0));
     return real_from_bits(lanes_select(moves, bits + step, bits));
 }
 
@@ -59,14 +59,14 @@ __attribute__((noinline)) static real real_fma(real a, real b, real c)
 {
     const real one = (real)(1), up = (real)(0x1p64f), down = (real)(0x1p-64f);
     real size = fabs(a * b), c_size = fabs(c);
-    mask is_small = (size < (real)(0x1p-80f)) & (c_size < (real)(0x1p20f)); // a larger c is the sum
-    mask is_large = fmax(size, c_size) > (real)(0x1p100f);
+    mask is_small = (size < 0x1p-80f) & (c_size < 0x1p20f); // a larger c is the sum
+    mask is_large = fmax(size, c_size) > 0x1p100f;
     mask a_is_less = fabs(a) < fabs(b);
     real less = lanes_select(a_is_less, a, b) * lanes_select(is_small, up, one);
     real greater = lanes_select(a_is_less, b, a) * lanes_select(is_large, down, one);
     // where a c that would vanish next to a large product decides, the product is halfway between two reals,
     // and the sign of c is enough
-    real large_c = lanes_select(c_size > (real)(0), copysign(fmax(c_size * down, (real)(0x1p-60f)), c), c);
+    real large_c = lanes_select(c_size > 0, copysign(fmax(c_size * down, (real)(0x1p-60f)), c), c);
     real scaled_c = lanes_select(is_large, large_c, c * lanes_select(is_small, up, one));
     real back = lanes_select(is_small, down, lanes_select(is_large, up, one));
 
@@ -78,12 +78,12 @@ __attribute__((noinline)) static real real_fma(real a, real b, real c)
     real normal = copysign((real)(0x1p-62f), rounded_once);
     Pair shifted = two_sum(normal, upper.high);
     real rounded_steps = (shifted.high + pair_round_to_odd(two_sum(shifted.low, rest))) - normal;
-    mask is_subnormal = is_small & (fabs(rounded_once) <= (real)(0x1p-62f));
+    mask is_subnormal = is_small & (fabs(rounded_once) <= 0x1p-62f);
     rounded_once = lanes_select(is_subnormal, copysign(rounded_steps, rounded_once), rounded_once);
     // has the right sign if the sum is 0, and is right beyond the largest real
     real rounded_twice = product.high + scaled_c;
-    mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
-    return lanes_select(finite & (upper.high + rest != (real)(0)), rounded_once, rounded_twice) * back;
+    mask finite = (fabs(rounded_twice) <= LARGEST) & (fabs(upper.high) <= LARGEST);
+    return lanes_select(finite & (upper.high + rest != 0), rounded_once, rounded_twice) * back;
 }
 
 #endif

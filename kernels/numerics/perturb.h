@@ -40,7 +40,7 @@ static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
     largest *= PERTURB_SCALE;
     const unsigned_integer steps = mul_hi(hash, (unsigned_integer)(2 * largest + 1)); // 0 to 2 largest
-    mask ordinary = (fabs(value) > (real)(SMALLEST_RATIO)) & (fabs(value) < (real)(1 / SMALLEST_RATIO));
+    mask ordinary = (fabs(value) > SMALLEST_RATIO) & (fabs(value) < 1 / SMALLEST_RATIO);
     const integer moved = bits_from_real(value) + integer_from_unsigned(steps) - integer_of(largest);
     return lanes_select(ordinary, real_from_bits(moved), value);
 }

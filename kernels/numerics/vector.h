@@ -82,7 +82,7 @@ static inline real vector_norm(Vector a)
 static inline Vector vector_normalize(Vector a)
 {
     real norm = vector_norm(a);
-    mask zero = norm == (real)(0);
+    mask zero = norm == 0;
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
 
