@@ -53,7 +53,7 @@ static inline SurfacePoint affine_surface_point(const scalar4 rows[3], scalar co
                                                 Vector normal, Vector largest, real rounding_scale)
 {
     const real norm = vector_norm(normal);
-    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
+    const real inverse = real_divide((real)(1), lanes_select(norm > 0, norm, (real)(1)));
     const Vector reach = affine_reach(rows, largest);
     const real mapping_scale = real_max_of_3(reach.x, reach.y, reach.z);
     rounding_scale = real_fma((real)(0.25f), vector_norm1(p), rounding_scale) * inverse;

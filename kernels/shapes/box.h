@@ -38,7 +38,7 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
 static inline real slab_distance(Interval slab, real direction, real t, mask *low_face)
 {
     mask entering = fabs(t - slab.near) <= fabs(t - slab.far);
-    *low_face = entering == (direction > (real)(0));
+    *low_face = entering == (direction > 0);
     return interval_end_distance(slab, t);
 }
 
@@ -85,7 +85,7 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
                                           real_max(fabs(to_low.y), fabs(to_high.y)),
                                           real_max(fabs(to_low.z), fabs(to_high.z))});
     real place = ray_place_error(ray, distance) +
-                 (real)(UNIT_ROUNDOFF)*real_fma((real)(8), distance, (real)(2) * vector_norm1(ray->origin));
+                 UNIT_ROUNDOFF * real_fma((real)(8), distance, 2 * vector_norm1(ray->origin));
     Interval outer = slabs_common(box_slabs(box, ray, place));
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();

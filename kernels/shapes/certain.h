@@ -35,7 +35,7 @@ static inline Bounded bounded_quotient(Bounded a, Bounded b)
     const real inverse = real_divide((real)(1), lanes_select(usable, b.value, (real)(1)));
     const real quotient = a.value * inverse;
     const real error = DIVISOR_SLACK * real_fma(fabs(quotient), b.error, a.error) * fabs(inverse) +
-                       (real)(8 * UNIT_ROUNDOFF) * fabs(quotient);
+                       8 * UNIT_ROUNDOFF * fabs(quotient);
     return (Bounded){quotient, lanes_select(usable, error, NEVER)};
 }
 
@@ -63,7 +63,7 @@ static inline mask ray_starts_on(const Ray *ray, uint id)
 // u less.
 static inline real ray_end_above(const Ray *ray)
 {
-    return ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
+    return ray->tmax * (1 + 64 * UNIT_ROUNDOFF);
 }
 
 // Returns the lanes whose crossing between low and high lies before the ray's start or beyond its end.
@@ -80,7 +80,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers, it may be anywhere
     perhaps = perhaps & !excluded;
     const mask found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
-    return (CertainHit){found, perhaps & !found, (real)(0.5f) * (low + high), low, high};
+    return (CertainHit){found, perhaps & !found, 0.5f * (low + high), low, high};
 }
 
 // Moves a hit to t, which may be far from the middle of its bounds, unless t is outside them.

@@ -24,8 +24,8 @@ static inline CylinderLine cylinder_line(const Round *round, const Ray *ray)
     // twice, since the axis' length, which is off by 14 u, leaves a part of the height
     line.q = round_across(round, round_across(round, ray->direction));
     line.squared_q = vector_dot(line.q, line.q);
-    line.slanted = line.squared_q >
-                   real_fma((real)(64) * round->error_per_t, round->error_per_t, (real)(SMALLEST_RATIO));
+    line.slanted =
+        line.squared_q > real_fma(64 * round->error_per_t, round->error_per_t, (real)(SMALLEST_RATIO));
     const real inverse = real_divide((real)(1), lanes_select(line.slanted, line.squared_q, (real)(1))),
                inverse_squared = lanes_select(line.slanted, inverse, (real)(0));
     line.inverse_length = real_sqrt(inverse_squared);
@@ -38,10 +38,10 @@ static inline CylinderLine cylinder_line(const Round *round, const Ray *ray)
     line.middle = first + step;
     const real terms =
         real_fma(round->direction_norm1, fabs(first), round->start_norm1) + round->radius + round->radius;
-    const real in_u = real_fma((real)(3), terms, (real)(ROUND_ERROR)*vector_norm1(x));
+    const real in_u = real_fma((real)(3), terms, ROUND_ERROR * vector_norm1(x));
     line.middle_error =
         BOUND_SLACK * (ray_place_error(ray, ray->length * fabs(line.middle)) + round->shape_error) +
-        (real)(UNIT_ROUNDOFF)*in_u;
+        UNIT_ROUNDOFF * in_u;
     return line;
 }
 
@@ -69,7 +69,7 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
     const real reach = real_max(fabs(from), fabs(to)) + fabs(line.middle);
     // Farther from the middle a slanted line's distance from the axis is at least 8/5 of the radius and its
     // error.
-    real span = (real)(2) * (radius + line.middle_error) * line.inverse_length * more;
+    real span = 2 * (radius + line.middle_error) * line.inverse_length * more;
     span = cylinder_half_chord(&line, radius + cylinder_place(round, &line, real_min(span, reach))) * more;
     const real place = cylinder_place(round, &line, lanes_select(line.slanted, real_min(span, reach), reach));
     const real outer = radius + place, inner = real_max(radius - place, zero),
@@ -77,8 +77,7 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
     CertainInterval interval;
     interval.perhaps = lanes & !(line.slanted & (outer * outer < squared));
     interval.certain = interval.perhaps & line.slanted & (inner * inner > squared);
-    const real along =
-        u * real_fma((real)(6) * outer, line.inverse_length * more, (real)(3) * fabs(line.middle));
+    const real along = u * real_fma(6 * outer, line.inverse_length * more, 3 * fabs(line.middle));
     const real outer_half = real_fma(more, cylinder_half_chord(&line, outer), along),
                inner_half = real_fma(less, cylinder_half_chord(&line, inner), -along),
                root_half = cylinder_half_chord(&line, radius);

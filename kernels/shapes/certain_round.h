@@ -44,10 +44,10 @@ static inline Bounded round_value_from_eye(const Round *round, Vector x, real z)
     const real rise = round->slope * z, twice = round->radius + round->radius, size = vector_norm1(x),
                lift = round->curves ? round->k * z : rise * (twice + rise),
                terms = real_fma(size, size + round->foot_norm1 + round->foot_norm1,
-                                fabs(lift) + fabs(rise) * fabs(twice) + (real)(2) * fabs(round->power));
+                                fabs(lift) + fabs(rise) * fabs(twice) + 2 * fabs(round->power));
     const Vector beyond = vector_fma(round->foot, (real)(-2), x);
     return (Bounded){round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift),
-                     (real)(16 * UNIT_ROUNDOFF) * terms};
+                     16 * UNIT_ROUNDOFF * terms};
 }
 
 static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
@@ -64,7 +64,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     point.rho = vector_norm(point.across);
     point.radius = real_fma(round->slope, z, round->radius);
     // the axis' length is off by 14.5 u, so that 29 u of z remain in the vector across it
-    const real left_of_z = (real)(32 * UNIT_ROUNDOFF) * z;
+    const real left_of_z = 32 * UNIT_ROUNDOFF * z;
     real band = left_of_z * left_of_z;
     Bounded from_eye = {(real)(0), (real)(0)};
     if (round->has_power) {
@@ -78,7 +78,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     }
     real sum = point.rho + fabs(point.radius);
     point.value = (point.rho - point.radius) * sum;
-    if (round->has_power) point.value = lanes_select(point.radius < (real)(0), point.value, from_eye.value);
+    if (round->has_power) point.value = lanes_select(point.radius < 0, point.value, from_eye.value);
     point.band = real_fma(place * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), band);
     return point;
 }
@@ -97,7 +97,7 @@ static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
     Vector m = start.across, q = round_across(round, ray->direction);
     real rise = vector_dot(round->axis, ray->direction), z = vector_dot(round->axis, round->start);
     real mq = vector_dot(m, q), qq = vector_dot(q, q), h = round->slope * rise;
-    real half_k = (real)(0.5f) * round->k, bend = half_k * rise;
+    real half_k = 0.5f * round->k, bend = half_k * rise;
     const real a = real_fma(-h, h, qq), b = round->curves ? mq - bend : real_fma(-start.radius, h, mq);
     RoundQuadratic quadratic = {m, q, rise, h, a, b, start.value};
     if (!round->has_power && !round->curves)
@@ -125,8 +125,7 @@ static inline mask height_is_positive(real height, real slope, real slope_error,
 {
     real at_from = height - real_max(slope + slope_error, (real)(0)) * (t - part.near);
     real at_to = height + (slope - slope_error) * (part.far - t);
-    return (height > (real)(0)) & (at_from > (real)(0)) &
-           ((slope >= slope_error) | (ends & (at_to > (real)(0))));
+    return (height > 0) & (at_from > 0) & ((slope >= slope_error) | (ends & (at_to > 0)));
 }
 
 // A plane between an unbounded ray and the side is tilted by this many errors of the ray's direction: one to
@@ -162,7 +161,7 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         slope = real_fma(-round->k, quadratic->rise, along + along);
         slope_error = round->error_per_t * (point.rho + point.rho + round->k);
         tilted_slope = ROUND_TILT_ERRORS * slope_error;
-        real tilt = divide_or((real)(0.5f) * (tilted_slope - slope), q_length, zero);
+        real tilt = divide_or(0.5f * (tilted_slope - slope), q_length, zero);
         tilted = real_fma(-tilt, tilt, height);
         tilts = q_length > zero;
     } else {
@@ -175,7 +174,7 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         tilted_slope = h - quadratic->h;
         // This is not height - rho + n . x, because at a planet's radius the rounding of rho exceeds the
         // height. `along_unit` is off by 17 u rho, rho by 9 u, the sum and the quotient add up to 15 u.
-        real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 64 * UNIT_ROUNDOFF);
+        real tilted_rho = fabs(tilt) * point.rho * (1 + 64 * UNIT_ROUNDOFF);
         tilted = height + divide_or(real_fma(tilt, along_unit, -tilted_rho), one + fabs(tilt), zero);
         slope = real_fma(share, q_length, -quadratic->h);
     }
@@ -212,13 +211,13 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         real t = interval_clamp(part, roots[i]);
         RoundPoint point = round_point(round, ray, t);
         real slope = real_fma(a, t, quadratic.b); // half the slope
-        real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
+        real step = divide_or(0.5f * point.value, slope, (real)(0));
         // otherwise it was not a root; from an end, where it is clamped, a step would lead beyond the end
         mask settles = (t == roots[i]) & (fabs(step) * ROOT_OVER_STEP < fabs(t));
         roots[i] = t = lanes_select(settles, t - step, t);
         // the sign is certain one band away
         real band = ROOT_SIDE_BANDS * point.band, bend = fabs(a) * band;
-        real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
+        real steepness = real_max(fabs(slope), 0.5f * real_sqrt(bend));
         real width =
             divide_or(band, steepness + real_sqrt(real_max(real_fma(steepness, steepness, -bend), (real)(0))),
                       (real)(0));
@@ -251,7 +250,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
 // nothing is certain.
 static inline Interval round_range(const Ray *ray, real size)
 {
-    const real range = (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
+    const real range = 0x1p-10f / UNIT_ROUNDOFF * size * ray_inverse_length(ray);
     return (Interval){-range, range};
 }
 

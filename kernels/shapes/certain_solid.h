@@ -58,9 +58,9 @@ typedef struct {
 // Returns the interval where slope t >= least.
 static inline Interval interval_above(real slope, real least)
 {
-    mask rises = slope > (real)(SMALLEST_RATIO), falls = slope < (real)(-SMALLEST_RATIO);
+    mask rises = slope > SMALLEST_RATIO, falls = slope < -SMALLEST_RATIO;
     real t = real_divide(least, lanes_select(rises | falls, slope, (real)(1)));
-    real empty = lanes_select(least > (real)(0), (real)(LARGEST), (real)(-LARGEST));
+    real empty = lanes_select(least > 0, (real)(LARGEST), (real)(-LARGEST));
     real none = lanes_select(rises, t, lanes_select(falls, (real)(-LARGEST), empty));
     return (Interval){none, lanes_select(falls, t, (real)(LARGEST))};
 }
@@ -92,11 +92,11 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
                                           Interval range)
 {
     real radius = real_fma(round.slope, vector_dot(round.axis, round.start), round.radius);
-    real error = round.start_error * ((real)(1) + fabs(round.slope));
+    real error = round.start_error * (1 + fabs(round.slope));
     const CertainInterval slab = round_unbounded();
     CertainHit hits[2];
     for (uint i = 0; i < 2; i++) {
-        mask on_it = leaves & (radius > (real)(0));
+        mask on_it = leaves & (radius > 0);
         CertainInterval side =
             round_interval(&round, ray, lanes & !(on_it & ray->leaves_outward), range, false);
         hits[i] = round_first_hit(flags, ray, &side, &slab, on_it);
@@ -186,23 +186,23 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
 {
     const Round *round = &solid->round;
     const RoundPoint at = round_point(round, ray, t);
-    real error = (real)(2) * (place_error + at.place);
+    real error = 2 * (place_error + at.place);
     real curvature =
         divide_or((real)(round->curves ? 3 : 1), round->curves ? real_max(round->k, at.rho) : at.rho,
                   (real)(1 / SMALLEST_RATIO));
     real rounding = at.rounding; // with a power, also of the foot
     if (round->has_power) rounding = real_fma((real)(2 * UNIT_ROUNDOFF), round->foot_norm1, rounding);
     point->curvature = curvature;
-    point->normal_error = (real)(2) * real_fma(rounding, curvature, solid->axis_error);
+    point->normal_error = 2 * real_fma(rounding, curvature, solid->axis_error);
     if (!(flags & REVOLUTION_CAPPED)) return mask_none();
     real z = vector_dot(round->axis, vector_fma(ray->direction, t, round->start));
     real from_end = real_min(fabs(z - solid->low), fabs(z - solid->high));
     real side_band = error * (round->curves ? at.rho + at.rho + error + round->k
-                                            : (at.rho + fabs(at.radius)) * ((real)(1) + fabs(round->slope)));
+                                            : (at.rho + fabs(at.radius)) * (1 + fabs(round->slope)));
     mask near_end = from_end <= error, near_side = fabs(at.value) <= at.band + side_band;
     mask on_cap = near_end & !near_side;
     real_replace(&point->curvature, on_cap, (real)(0));
-    real_replace(&point->normal_error, on_cap, (real)(2) * solid->axis_error);
+    real_replace(&point->normal_error, on_cap, 2 * solid->axis_error);
     return near_end & near_side;
 }
 

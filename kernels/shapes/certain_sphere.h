@@ -63,13 +63,13 @@ static inline SphereErrors sphere_errors(real radius, real middle_t, const Ray *
     SphereErrors errors;
     // not less than |f| if |l| is up to twice the radius; beyond, errors in proportion to |l| do not count
     const real distance = errors.distance = real_fma(fabs(middle_t), ray->length, radius + radius);
-    const real rounding = (real)(UNIT_ROUNDOFF)*real_fma(
-        (real)(3), distance, real_fma((real)(6), radius, vector_norm1(ray->origin)));
+    const real rounding =
+        UNIT_ROUNDOFF * real_fma((real)(3), distance, real_fma((real)(6), radius, vector_norm1(ray->origin)));
     // neither crossings nor the closest point are farther than this and the place
     const real farthest = distance - radius, place = ray_place_error(ray, farthest) * BOUND_SLACK + rounding;
     errors.place = real_fma(ray->direction_error, place, place);
-    errors.along = (real)(16 * UNIT_ROUNDOFF) * distance;
-    errors.band = real_fma(errors.place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + errors.place,
+    errors.along = 16 * UNIT_ROUNDOFF * distance;
+    errors.band = real_fma(errors.place * (1 + 8 * UNIT_ROUNDOFF), radius + radius + errors.place,
                            errors.along * errors.along);
     return errors;
 }
@@ -81,15 +81,15 @@ static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, r
     const real inverse_length = ray_inverse_length(ray), radius = sphere->radius, place = errors->place;
     // In t. If it is uncertain, this is the half chord of the band, between 0 and that of twice the band.
     sphere->half_chord = real_sqrt(real_max(squared, errors->band) * ray->inverse_squared);
-    const mask usable = sphere->half_chord > (real)(0);
+    const mask usable = sphere->half_chord > 0;
     const real inverse = real_divide((real)(1), lanes_select(usable, sphere->half_chord, (real)(1)));
-    sphere->inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
+    sphere->inverse_slope = 0.5f * ray->inverse_squared * inverse;
     const real inverse_chord = inverse * inverse_length, x = errors->band * (inverse_chord * inverse_chord),
                steepness = real_fma(SPHERE_STEEPENING * inverse_chord, x, inverse_chord),
-               few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
+               few_squares = 4 * UNIT_ROUNDOFF * (radius * radius);
     const real moved = real_fma(real_fma(SPHERE_HALF_BAND, errors->band, real_fma(place, place, few_squares)),
                                 steepness, SPHERE_ALONG * x * place);
-    sphere->refines = SPHERE_REFINING * errors->along * steepness < (real)(1);
+    sphere->refines = SPHERE_REFINING * errors->along * steepness < 1;
     const real computed =
         lanes_select(sphere->refines, SPHERE_REFINED_ERROR * errors->distance, errors->along + errors->along);
     sphere->t_error = inverse_length * (moved + computed);
@@ -105,7 +105,7 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     const real squared = real_fma(radius, radius, -vector_dot(closest, closest));
     const SphereErrors errors = sphere_errors(radius, middle_t, ray);
     // excluded if all of it lies behind the start or beyond the end
-    const real reach = ray_inverse_length(ray) * (radius + (real)(2) * (errors.place + errors.along));
+    const real reach = ray_inverse_length(ray) * (radius + 2 * (errors.place + errors.along));
     const mask apart = ray_excludes(ray, middle_t - reach, middle_t + reach);
     CertainSphere crossed = {.start = start,
                              .radius = radius,
@@ -128,7 +128,7 @@ typedef struct {
 static inline BoundedLine line_within_bounds(Vector center, real radius, const Ray *ray)
 {
     const CertainSphere bounding =
-        certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+        certain_sphere(center, radius * (1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
     BoundedLine line = {bounding.perhaps, {(real)(0), (real)(0)}, bounding.middle_t};
     if (!lanes_any(line.lanes)) return line;
     line.part = (Interval){sphere_near(&bounding, ray) - bounding.t_error,

@@ -63,7 +63,7 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
     signs.perhaps = !misses;
     signs.certain = ((u_low > zero) & (v_low > zero) & (w_low > zero)) |
                     ((u_high < zero) & (v_high < zero) & (w_high < zero));
-    signs.coordinates = (real)(2) * (a_sum + b_sum + c_sum);
+    signs.coordinates = 2 * (a_sum + b_sum + c_sum);
     return signs;
 }
 
@@ -72,7 +72,7 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
 static inline real triangle_place_error(const Ray *ray, real distance, real size)
 {
     return ray_place_error(ray, distance) +
-           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, VERTEX_ROUNDING * size);
+           UNIT_ROUNDOFF * real_fma((real)(TRIANGLE_ERROR), distance, VERTEX_ROUNDING * size);
 }
 
 // Returns a bound on the error of the vertices' coordinates in the ray's frame.
@@ -113,7 +113,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     mask perhaps = signs.perhaps;
     const CornerReals ts = corners_dot(edges->seen, ray_along(ray));
     real low = real_min_of_3(ts.a, ts.b, ts.c), high = real_max_of_3(ts.a, ts.b, ts.c);
-    real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
+    real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + 4 * error;
     real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
     // most triangles that lines hit lie behind the start or beyond the end
@@ -125,13 +125,13 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
     real t = ts.c + real_fma(ts.a - ts.c, edges->u * inverse, (ts.b - ts.c) * (edges->v * inverse));
     real part = WEIGHTS_ERROR * edge_error * fabs(inverse);
-    real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
+    real t_error = (high - low) * (part + 16 * UNIT_ROUNDOFF) +
                    real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
     low = low - vertex_error;
     high = high + vertex_error;
     Interval bounds = {lanes_select(narrows, real_max(low, t - t_error), low),
                        lanes_select(narrows, real_min(high, t + t_error), high)};
-    mask slim = perhaps & !(narrows & (t_error <= (real)(4) * vertex_error));
+    mask slim = perhaps & !(narrows & (t_error <= 4 * vertex_error));
     if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &bounds, &t);
     if (HAS_SMOOTH_NORMALS) {
         real_replace(&bounds.near, sinks, real_max(bounds.near, (real)(SMALLEST_RATIO)));
@@ -195,11 +195,11 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     mask in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
          behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
     Vector normal = triangle_normal(triangle);
-    real turned = ray->direction_error + (real)(2 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
+    real turned = ray->direction_error + (2 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
     real moved = real_fma(ray->length, turned, ray->ends_at_light ? ray->origin_error : (real)(0));
     real along = vector_dot(normal, ray->direction);
     real error =
-        (real)(8 * UNIT_ROUNDOFF) * vector_norm1_along(normal, ray->direction) + vector_norm1(normal) * moved;
+        8 * UNIT_ROUNDOFF * vector_norm1_along(normal, ray->direction) + vector_norm1(normal) * moved;
     return (is_behind & ray->leaves_outward) | (in_front & (along > error)) | (behind & (along < -error));
 }
 

@@ -49,8 +49,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     DiscCrossing crossing = IS_COMPENSATED ? disc_crossing_compensated(disc, ray) : disc_crossing(disc, ray);
     if (!IS_COMPENSATED) {
         real steepest_squared = vector_dot(normal, normal) * ray->squared;
-        mask grazing =
-            RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
+        mask grazing = RAY_ACTIVE(ray) & (crossing.along * crossing.along < 0x1p-8f * steepest_squared);
         if (lanes_any(grazing)) {
             DiscCrossing compensated = disc_crossing_compensated(disc, ray);
             real_replace(&crossing.height, grazing, compensated.height);
@@ -61,7 +60,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
     if (!lanes_any(hit)) return hit;
     if (has_eye_power(disc->id))
-        return hit & (eye_power_at(disc->id, center, ray_point(ray, *t)) <= (real)(0)) & (*t > ray->tmin);
+        return hit & (eye_power_at(disc->id, center, ray_point(ray, *t)) <= 0) & (*t > ray->tmin);
     real radius = (real)(disc->center_radius.w);
     // nearly in the plane n . d hardly determines t, but the crossing is not farther from the center than the
     // rim
@@ -101,9 +100,8 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector across = vector_fma(ray->direction, hit.t, f);
     real moved = ray->length, path = moved * fabs(hit.t);
     // 3 u of f and the path are needed, and 4 u of the radius, as for a sphere
-    real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
-                 (real)(UNIT_ROUNDOFF) *
-                     ((real)(4) * (vector_norm1(f) + path) + (real)(8) * radius + vector_norm1(ray->origin));
+    real place = ray_place_error(ray, path) + moved * (0.5f * (hit.high - hit.low)) +
+                 UNIT_ROUNDOFF * (4 * (vector_norm1(f) + path) + 8 * radius + vector_norm1(ray->origin));
     real squared = real_fma(radius, radius, -vector_dot(across, across));
     real band = place * (radius + radius + place);
     mask within = squared > band, beyond = crosses & (squared < -band);

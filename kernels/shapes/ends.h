@@ -18,12 +18,11 @@ static inline mask line_is_off_axis(Vector from, real squared_reach, Vector axis
     const Vector q = vector_cross(ray->direction, axis);
     const real moment = vector_dot(from, q), squared_q = vector_dot(q, q),
                squared_error = error_per_t * error_per_t;
-    const real slack = (vector_dot(from, from) + squared_reach) * squared_axis *
-                       real_fma((real)(0x1p7f), squared_error,
-                                (real)(0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF) * ray->squared);
-    return (moment * moment >
-            real_fma((real)(1 + 0x1p-4f) * squared_reach, squared_q, slack + (real)(SMALLEST_RATIO))) &
-           ((real)(0x1p6f) * squared_error * squared_axis <= squared_q);
+    const real slack =
+        (vector_dot(from, from) + squared_reach) * squared_axis *
+        real_fma((real)(0x1p7f), squared_error, 0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF * ray->squared);
+    return (moment * moment > real_fma((1 + 0x1p-4f) * squared_reach, squared_q, slack + SMALLEST_RATIO)) &
+           (0x1p6f * squared_error * squared_axis <= squared_q);
 }
 
 // Returns the lanes whose line from + t d certainly stays off the double cone of a slope k around the unit
@@ -38,12 +37,11 @@ static inline mask line_is_off_cone(Vector from, real slope, Vector axis, real s
                                     const Ray *ray)
 {
     const Vector n = vector_cross(from, ray->direction);
-    const real along = vector_dot(n, axis), squared_slope = slope * slope,
-               squared_secant = (real)(1) + squared_slope,
-               spread = (real)(3) * error_per_t * vector_norm1(from),
+    const real along = vector_dot(n, axis), squared_slope = slope * slope, squared_secant = 1 + squared_slope,
+               spread = 3 * error_per_t * vector_norm1(from),
                squared_error = real_fma(spread, spread, start_error * start_error * ray->squared);
-    return squared_secant * (along * along - (real)(34) * squared_error) >
-           real_fma((real)(1 + 0x1p-4f) * squared_slope, vector_dot(n, n), (real)(SMALLEST_RATIO));
+    return squared_secant * (along * along - 34 * squared_error) >
+           real_fma((1 + 0x1p-4f) * squared_slope, vector_dot(n, n), (real)(SMALLEST_RATIO));
 }
 
 // The intervals of t that decide where a ray hits the side and the caps.

@@ -21,7 +21,7 @@ static inline real interval_end_distance(Interval interval, real t)
 
 static inline real interval_middle(Interval interval)
 {
-    return (real)(0.5f) * (interval.near + interval.far);
+    return 0.5f * (interval.near + interval.far);
 }
 
 static inline real interval_clamp(Interval interval, real t)
@@ -37,7 +37,7 @@ static inline Interval slab_crossings(real low, real high, real more, real origi
                                       real inverse)
 {
     const real from = low - origin, to = high - origin;
-    const mask parallel = IS_CERTIFIED ? fabs(direction) <= (real)(SMALLEST_RATIO) : direction == (real)(0);
+    const mask parallel = IS_CERTIFIED ? fabs(direction) <= SMALLEST_RATIO : direction == 0;
     const mask between = (from <= more) & (to >= -more);
     real to_low = from * inverse, to_high = to * inverse;
     if (IS_COMPENSATED) {

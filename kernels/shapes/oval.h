@@ -103,7 +103,7 @@ static inline OvalRay oval_ray(const Oval *oval, const Ray *ray)
     mapped.shift = (real)(0);
     if (!IS_CERTIFIED) {
         const real reach = (real)(oval->inverses[1].w);
-        const mask is_far = vector_dot(from, from) > (real)(4) * reach * reach;
+        const mask is_far = vector_dot(from, from) > 4 * reach * reach;
         mapped.shift =
             lanes_select(is_far, -vector_dot(from, ray->direction) * ray->inverse_squared, (real)(0));
         from = ray_point_from(ray, center, mapped.shift);
@@ -128,7 +128,7 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
         if (!lanes_any(passed)) break;
         real_replace(&own.ray.tmin, passed, unit_t);
     }
-    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < LARGEST);
 }
 
 static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, real t)
@@ -181,8 +181,8 @@ static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, rea
     const real turned = unit.curvature * moved; // with all orders of both turns
     point->curvature = growth * norm * unit.curvature;
     point->normal_error =
-        growth * (real_fma(turned, real_fma((real)(8), turned, (real)(2)), unit.normal_error) +
-                  (real)(32 * UNIT_ROUNDOFF));
+        growth *
+        (real_fma(turned, real_fma((real)(8), turned, (real)(2)), unit.normal_error) + 32 * UNIT_ROUNDOFF);
     return at_edge;
 }
 

@@ -22,10 +22,10 @@
 // Returns the interval of t where the ray is on the apex' side of the shape's end plane.
 static inline Interval paraboloid_slab(real end, Pair from, real towards)
 {
-    mask parallel = towards == (real)(0), leaving = towards > (real)(0);
+    mask parallel = towards == 0, leaving = towards > 0;
     real gap = pair_subtract(pair_of(end), from).high;
     real t = real_divide(gap, lanes_select(parallel, (real)(1), towards));
-    t = lanes_select(parallel, lanes_select(gap >= (real)(0), (real)(LARGEST), (real)(-LARGEST)), t);
+    t = lanes_select(parallel, lanes_select(gap >= 0, (real)(LARGEST), (real)(-LARGEST)), t);
     return (Interval){lanes_select(leaving | parallel, (real)(-LARGEST), t),
                       lanes_select(leaving | parallel, t, (real)(LARGEST))};
 }
@@ -57,12 +57,12 @@ static inline EndedCrossings paraboloid_crossings(const Paraboloid *shape, const
     c = pair_subtract(c, pair_scale(axial.height, k));
     real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(axial.squared_axis, off)).high;
     if (has_power) {
-        const mask near_side = fabs(c.high) < (real)(0.5f) * squared_m.high;
+        const mask near_side = fabs(c.high) < 0.5f * squared_m.high;
         real_replace(&discriminant, near_side, pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high);
     }
 
     EndedCrossings crossings;
-    crossings.real_roots = discriminant >= (real)(0);
+    crossings.real_roots = discriminant >= 0;
     // a ray along the axis has a = 0 and one root, since the other is infinitely far on the open side
     crossings.side = quadratic_interval(quadratic_roots(a.high, b.high, c.high, discriminant));
     crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
@@ -89,7 +89,7 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
     if (!lanes_any(hit)) return hit;
     const EndedCrossings crossings = paraboloid_crossings(shape, ray);
     hit = hit & ends_first_hit(shape->id.y, ray, &crossings, t);
-    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < LARGEST);
 }
 
 // Returns the surface point. On the cap it is moved along the axis, on the side by two Newton steps along the
@@ -105,8 +105,8 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         real height = vector_dot(position, axis);
         Vector across = vector_fma(axis, -real_divide(height, squared_axis), position);
         Vector gradient = vector_fma(axis, -half_lift, across);
-        real excess = real_fma((real)(-2) * half_lift, height, vector_dot(across, across));
-        real step = real_divide(excess, (real)(2) * vector_dot(gradient, gradient));
+        real excess = real_fma(-2 * half_lift, height, vector_dot(across, across));
+        real step = real_divide(excess, 2 * vector_dot(gradient, gradient));
         position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
@@ -144,9 +144,9 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
     round->k = (real)(shape->apex_k.w) * inverse;
     real lift = round->has_power ? (real)(shape->foot_lift.w) * inverse : (real)(0);
     solid.high = (real)(shape->axis_end.w) * inverse;
-    solid.half_height = (real)(0.5f) * (solid.high + lift);
-    solid.low = solid.high - (real)(4) * solid.half_height; // well below the apex
-    solid.widest = solid.is_finite ? real_sqrt((real)(2) * solid.half_height * round->k) : round->k;
+    solid.half_height = 0.5f * (solid.high + lift);
+    solid.low = solid.high - 4 * solid.half_height; // well below the apex
+    solid.widest = solid.is_finite ? real_sqrt(2 * solid.half_height * round->k) : round->k;
     solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
     solid.axis_error = (real)(16 * UNIT_ROUNDOFF);
     const real size = round->has_power ? (real)(0) : solid.widest + solid.half_height;

@@ -9,8 +9,8 @@
 // beyond the ray's start. Equal signs mean that the plane is ahead.
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
-    mask ahead = (height > (real)(0)) == (along > (real)(0));
-    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->tmin < (real)(0))) & quotient_is_bounded(height, along);
+    mask ahead = (height > 0) == (along > 0);
+    mask hit = RAY_ACTIVE(ray) & (ahead | (ray->tmin < 0)) & quotient_is_bounded(height, along);
     if (!lanes_any(hit)) return hit;
     *t = real_divide(height, lanes_select(hit, along, (real)(1)));
     return hit & (*t > ray->tmin);
@@ -25,8 +25,8 @@ static inline Bounded plane_height(Vector point, Vector normal, scalar normal_er
                                      : vector_dot(normal, to_point),
                       (real)(0)};
     if (!IS_CERTIFIED) return height;
-    height.error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(normal, to_point) +
-                                            (real)(2) * vector_norm1_along(normal, point));
+    height.error =
+        UNIT_ROUNDOFF * (6 * vector_norm1_along(normal, to_point) + 2 * vector_norm1_along(normal, point));
     if (normal_error > 0) height.error = real_fma((real)(normal_error), vector_norm1(to_point), height.error);
     return height;
 }
@@ -37,7 +37,7 @@ static inline Bounded plane_along(Vector normal, Vector direction)
     Bounded along = {IS_COMPENSATED ? vector_dot_compensated(normal, direction)
                                     : vector_dot(normal, direction),
                      (real)(0)};
-    if (IS_CERTIFIED) along.error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(normal, direction);
+    if (IS_CERTIFIED) along.error = 5 * UNIT_ROUNDOFF * vector_norm1_along(normal, direction);
     return along;
 }
 
@@ -84,7 +84,7 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     // nearly parallel, it crosses beyond the least distance over the greatest approach
     real least = real_max(fabs(height.value) - height.error, (real)(0));
     real greatest = (fabs(along.value) + along.error) * BOUND_SLACK;
-    real parallel_low = divide_or(least, greatest, (real)(LARGEST)) * (real)(1 - 16 * UNIT_ROUNDOFF);
+    real parallel_low = divide_or(least, greatest, (real)(LARGEST)) * (1 - 16 * UNIT_ROUNDOFF);
     crossing->near = lanes_select(crosses, crossing->near, parallel_low);
     crossing->far = lanes_select(crosses, crossing->far, (real)(LARGEST));
     return crosses;

@@ -10,7 +10,7 @@
 static inline real quadratic_q(real b, real d)
 {
     const real root = real_sqrt(real_max(d, (real)(0)));
-    return lanes_select(b < (real)(0), root - b, -(root + b));
+    return lanes_select(b < 0, root - b, -(root + b));
 }
 
 // Returns, for a = ray->squared, the first root beyond the ray's start, or the far one if only_far. From
@@ -18,10 +18,10 @@ static inline real quadratic_q(real b, real d)
 static inline real quadratic_first_root(const Ray *ray, real b, real c, real d, bool only_far)
 {
     const real q = quadratic_q(b, d);
-    mask ahead = b < (real)(0), zero = q == (real)(0); // zero: b = d = 0, so both roots are 0
+    mask ahead = b < 0, zero = q == 0; // zero: b = d = 0, so both roots are 0
     real t = lanes_select(zero, (real)(0), real_divide(c, lanes_select(zero, (real)(1), q)));
     // c / q is the nearer root if ahead, else the farther one
-    mask other = lanes_select(ahead, !(t > ray->tmin), ray->tmin < (real)(0));
+    mask other = lanes_select(ahead, !(t > ray->tmin), ray->tmin < 0);
     if (only_far) other = ahead;
     if (lanes_any(other)) {
         real q_over_a = IS_COMPENSATED ? real_divide(q, ray->squared) : q * ray->inverse_squared;
@@ -39,7 +39,7 @@ typedef struct {
 static inline QuadraticRoots quadratic_roots(real a, real b, real c, real d)
 {
     const real q = quadratic_q(b, d);
-    const mask zero = q == (real)(0), positive = (q > (real)(0)) == (a >= (real)(0));
+    const mask zero = q == 0, positive = (q > 0) == (a >= 0);
     const real q_over_a = divide_or(q, a, lanes_select(positive, (real)(LARGEST), (real)(-LARGEST)));
     const real c_over_q = real_divide(c, lanes_select(zero, (real)(1), q));
     return (QuadraticRoots){lanes_select(zero, q_over_a, c_over_q), q_over_a};
@@ -56,7 +56,7 @@ static inline Interval quadratic_interval(QuadraticRoots roots)
 static inline Interval quadratic_inside(QuadraticRoots roots, real a, real growth)
 {
     const Interval side = quadratic_interval(roots);
-    const mask once = a<(real)(0), enters = growth>(real)(0);
+    const mask enters = growth > 0, once = a < 0;
     return (Interval){lanes_select(once, lanes_select(enters, side.far, (real)(-LARGEST)), side.near),
                       lanes_select(once, lanes_select(enters, (real)(LARGEST), side.near), side.far)};
 }

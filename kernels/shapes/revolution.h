@@ -16,8 +16,8 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
         real radius = real_fma(quadric->h, t, quadric->g);
         real norm = vector_norm(across);
         real excess = (norm - fabs(radius)) * (norm + fabs(radius));
-        real steepness = (real)(2) * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
-        mask steep = quotient_is_bounded(excess, steepness) & (fabs(t) < (real)(LARGEST));
+        real steepness = 2 * real_fma(-radius, quadric->h, vector_dot(across, quadric->q));
+        mask steep = quotient_is_bounded(excess, steepness) & (fabs(t) < LARGEST);
         real step = real_divide(excess, lanes_select(steep, steepness, (real)(1)));
         t = lanes_select(steep, t - step, t);
     }
@@ -95,7 +95,7 @@ static inline mask revolution_is_off_line(const Revolution *shape, bool sloped, 
     const scalar inverse = uniform_divide(1, shape->range.y), reach = revolution_widest(shape) * inverse;
     if (sloped && !(shape->id.y & REVOLUTION_FINITE))
         return line_is_off_cone(from, (real)(shape->axis_slope.w), vector_scale(axis, (real)(inverse)), zero,
-                                (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction), ray);
+                                32 * UNIT_ROUNDOFF * vector_norm1(ray->direction), ray);
     return line_is_off_axis(from, (real)(reach * reach), axis, (real)(shape->range.z), zero, ray);
 }
 
@@ -122,12 +122,12 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     // Without roots the line misses the side, unless it is within a cone everywhere but between its nappes or
     // runs along the side.
-    hit = hit & ((quadric.discriminant >= (real)(0)) | (quadric.a <= (real)(0)));
+    hit = hit & ((quadric.discriminant >= 0) | (quadric.a <= 0));
     if (!lanes_any(hit)) return hit;
     const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     hit = hit & ends_first_hit(shape->id.y, ray, &crossings, t);
     if (sloped && (shape->id.y & REVOLUTION_FINITE)) hit = hit & revolution_reaches(shape, &quadric, ray, *t);
-    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
+    return hit & (*t > ray->tmin) & (*t < LARGEST);
 }
 
 // Returns the point of the side next to p, which is relative to the base. `height` is p . axis.
@@ -146,11 +146,11 @@ static inline SurfacePoint revolution_side_point(const Revolution *shape, bool s
         // |p x w| - R - k p . w has the gradient |w| radial - k w, on the mirror nappe |w| radial + k w
         real slope = (real)(shape->axis_slope.w);
         real signed_radius = real_fma(slope, height, (real)(shape->base_radius.w));
-        mask mirrored = signed_radius < (real)(0);
+        mask mirrored = signed_radius < 0;
         real signed_slope = lanes_select(mirrored, -slope, slope);
         Vector gradient = vector_fma(axis, -signed_slope, vector_scale(radial, axis_length));
         // the apex does not have a normal; use the axis, the normal that an eye on it would expect
-        mask apex = axis_distance == (real)(0);
+        mask apex = axis_distance == 0;
         normal = vector_normalize(vector_select(apex, axis, gradient));
         real excess = axis_distance - real_divide(fabs(signed_radius), axis_length);
         real cos_half_angle = real_divide((real)(1), real_sqrt(real_fma(slope, slope, (real)(1))));
@@ -168,7 +168,7 @@ static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector 
 {
     Vector axis = vector_of(shape->axis_slope);
     real low = (real)(shape->range.w), high = (real)(shape->range.x);
-    mask at_base = height * (real)(2) < low + high;
+    mask at_base = height * 2 < low + high;
     real target = lanes_select(at_base, low, high);
     Vector on_plane = vector_fma(axis, real_divide(target - height, (real)(shape->range.z)), p);
     Vector end_normal = vector_normalize(axis);
@@ -234,7 +234,7 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (sloped) round->slope = (real)(shape->axis_slope.w);
     solid.low = (real)(shape->range.w) * inverse;
     solid.high = (real)(shape->range.x) * inverse;
-    solid.half_height = (real)(0.5f) * (solid.high - solid.low);
+    solid.half_height = 0.5f * (solid.high - solid.low);
     solid.middle = vector_fma(round->axis, solid.low + solid.half_height, base);
     solid.widest = round->radius;
     if (solid.is_finite)

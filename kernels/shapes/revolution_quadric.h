@@ -24,7 +24,7 @@ typedef struct {
 
 static inline mask revolution_near_side(real c, Vector m)
 {
-    return fabs(c) < (real)(0.5f) * vector_dot(m, m);
+    return fabs(c) < 0.5f * vector_dot(m, m);
 }
 
 // Returns c, computed from the eye's power.
@@ -33,7 +33,7 @@ static inline Pair revolution_power(const Revolution *shape, bool sloped, const 
 {
     Pair c = axial_power_change(vector_of(shape->base_radius), vector_of(shape->axis_slope), ray);
     if (sloped) {
-        const real twice_radius = (real)(2) * (real)(shape->base_radius.w);
+        const real twice_radius = 2 * (real)(shape->base_radius.w);
         const Pair rise = pair_scale(axial->height, (real)(shape->axis_slope.w));
         c = pair_subtract(c, pair_multiply(rise, pair_add(pair_of(twice_radius), rise)));
     }
@@ -121,8 +121,7 @@ static inline mask revolution_leaves_outward(const RevolutionQuadric *quadric, c
     real least_c =
         (real)(32 * UNIT_ROUNDOFF * shape->range.y * steepness) * base_distance * vector_norm(quadric->m);
     real least_a = (real)(0x1p-10f * steepness) * vector_dot(quadric->q, quadric->q);
-    return (quadric->a > least_a) & (quadric->b > (real)(0)) & (quadric->c > least_c) &
-           (ray->tmin >= (real)(0));
+    return (quadric->a > least_a) & (quadric->b > 0) & (quadric->c > least_c) & (ray->tmin >= 0);
 }
 
 // Refines lanes that start next to the side. Rejects those that leave it and compensates the others.

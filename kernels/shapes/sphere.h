@@ -25,9 +25,9 @@ static inline SphereQuadratic sphere_quadratic_near(const Sphere *sphere, const 
     } else {
         const Pair rr = two_product((real)(sphere->center_radius.w), (real)(sphere->center_radius.w));
         PairVector twice_low = to_center;
-        twice_low.x.low *= (real)(2);
-        twice_low.y.low *= (real)(2);
-        twice_low.z.low *= (real)(2);
+        twice_low.x.low *= 2;
+        twice_low.y.low *= 2;
+        twice_low.z.low *= 2;
         quadratic.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
     }
     quadratic.discriminant = difference_of_products(quadratic.b, quadratic.b, ray->squared, quadratic.c);
@@ -52,7 +52,7 @@ static inline ALWAYS_INLINE void sphere_quadratic_set(SphereQuadratic *quadratic
 // of the textbook's test.
 static inline mask leaves_sphere(real c, real squared_radius, real b, real tmin)
 {
-    return (c > (real)(32 * UNIT_ROUNDOFF) * squared_radius) & (b > (real)(0)) & (tmin >= (real)(0));
+    return (c > 32 * UNIT_ROUNDOFF * squared_radius) & (b > 0) & (tmin >= 0);
 }
 
 // Tests whether rays leave spheres outward, as sphere_hit does. `from` is the start seen from the center.
@@ -79,7 +79,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     real radius = (real)(sphere->center_radius.w), squared_radius = radius * radius;
     Vector f = vector_subtract(ray->origin, center);
     real b = vector_dot(f, ray->direction), squared_distance = vector_dot(f, f);
-    real lowered_c = real_fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF));
+    real lowered_c = real_fma(-radius, radius, squared_distance * (1 - 32 * UNIT_ROUNDOFF));
     mask hit = !(b * (b * ray->inverse_squared) < lowered_c);
     if (!lanes_any(hit)) return mask_none();
     hit = hit & RAY_ACTIVE(ray);
@@ -95,19 +95,18 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         discriminant = compensated.discriminant;
         b = compensated.b;
         c = compensated.c;
-        hit = hit & (discriminant >= (real)(0));
+        hit = hit & (discriminant >= 0);
     } else {
         Vector l = vector_fma(ray->direction, -b * ray->inverse_squared, f);
         real half_chord_squared = real_fma(radius, radius, -vector_dot(l, l));
         discriminant = ray->squared * half_chord_squared;
-        mask hits = half_chord_squared >= (real)(0),
-             near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
+        mask hits = half_chord_squared >= 0, near_surface = hit & (fabs(c) < 0.5f * squared_distance);
         if (RARELY(lanes_any(near_surface))) {
             const SphereQuadratic compensated = sphere_quadratic_near(sphere, ray);
             real_replace(&b, near_surface, compensated.b);
             real_replace(&c, near_surface, compensated.c);
             real_replace(&discriminant, near_surface, compensated.discriminant);
-            hits = lanes_select(near_surface, discriminant >= (real)(0), hits);
+            hits = lanes_select(near_surface, discriminant >= 0, hits);
         }
         hit = hit & hits;
     }
@@ -125,7 +124,7 @@ static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
     real inverse = real_divide((real)(1), ray->squared);
     Vector l = vector_scale(vector_cross(quadratic.moment, ray->direction), inverse);
     real h = real_sqrt(real_max(quadratic.discriminant, (real)(0))) * inverse;
-    mask far_side = real_fma(ray->squared, t, quadratic.b) > (real)(0);
+    mask far_side = real_fma(ray->squared, t, quadratic.b) > 0;
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
@@ -152,19 +151,18 @@ static inline BoundedPower sphere_power_along(const Sphere *sphere, const Ray *r
     const Vector center = vector_of(sphere->center_radius), from = vector_subtract(ray->origin, center);
     const real u = (real)(UNIT_ROUNDOFF), power = eye_power_of(sphere->id), moved = ray->origin_error;
     const real size = vector_norm1(ray->origin), center_size = vector_norm1(center),
-               sizes = size + center_size, distance = real_fma((real)(16) * u, sizes, vector_norm1(from));
+               sizes = size + center_size, distance = real_fma(16 * u, sizes, vector_norm1(from));
     const real turned = real_fma(ray->length, ray->direction_error, ray->ends_at_light ? moved : (real)(0));
     const Vector beyond = vector_fma(center, (real)(-2), ray->origin);
     const Bounded a = {ray->squared,
-                       real_fma(turned, ray->length + ray->length + turned, (real)(8) * u * ray->squared)};
-    const Bounded b = {
-        vector_dot(from, ray->direction),
-        real_fma(turned, distance + moved, ray->length * real_fma((real)(8) * u, sizes, moved))};
+                       real_fma(turned, ray->length + ray->length + turned, 8 * u * ray->squared)};
+    const Bounded b = {vector_dot(from, ray->direction),
+                       real_fma(turned, distance + moved, ray->length * real_fma(8 * u, sizes, moved))};
     const Bounded c = {power + vector_dot(ray->origin, beyond),
-                       real_fma((real)(16) * u, real_fma(size, sizes + center_size, fabs(power)),
+                       real_fma(16 * u, real_fma(size, sizes + center_size, fabs(power)),
                                 moved * (distance + distance + moved))};
     BoundedPower along = {bounded_quotient(b, a), bounded_quotient(c, a)};
-    along.start.error = along.start.error + (real)(SMALLEST_RATIO); // its terms may underflow
+    along.start.error = along.start.error + SMALLEST_RATIO; // its terms may underflow
     return along;
 }
 
@@ -181,12 +179,11 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     const BoundedPower along = sphere_power_along(sphere, ray);
     const Bounded middle = along.middle, start = along.start;
     const real far_middle = fabs(middle.value);
-    const Bounded discriminant = {
-        real_fma(middle.value, middle.value, -start.value),
-        real_fma(middle.error, far_middle + far_middle + middle.error,
-                 real_fma((real)(8) * u, middle.value * middle.value, start.error))};
+    const Bounded discriminant = {real_fma(middle.value, middle.value, -start.value),
+                                  real_fma(middle.error, far_middle + far_middle + middle.error,
+                                           real_fma(8 * u, middle.value * middle.value, start.error))};
     // Whether the ray starts outside or inside, wherever between tmin and -tmin.
-    const real change = (real)(2.0625f) * (far_middle + middle.error);
+    const real change = 2.0625f * (far_middle + middle.error);
     const mask outside = start.value - start.error > change * -ray->tmin,
                inside = start.value + start.error < (change - ray->tmin) * ray->tmin;
     const mask misses =
@@ -199,9 +196,9 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
                          (inside | ((outside | leaves) & (middle.value < -middle.error)));
     const real root = real_sqrt(lanes_select(certain, discriminant.value, (real)(1)));
     const Bounded q = {far_middle + root,
-                       middle.error + real_fma((real)(8) * u, root, real_divide(discriminant.error, root))};
+                       middle.error + real_fma(8 * u, root, real_divide(discriminant.error, root))};
     const Bounded size = {fabs(start.value), start.error};
-    const Bounded t = bounded_select(is_far & (middle.value < (real)(0)), q, bounded_quotient(size, q));
+    const Bounded t = bounded_select(is_far & (middle.value < 0), q, bounded_quotient(size, q));
     const real earliest =
         lanes_select(outside, real_divide(start.value - start.error, change), (real)(-LARGEST));
     const real low = lanes_select(certain, t.value - t.error, earliest),
@@ -234,7 +231,7 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
                          hit);
     if (!lanes_any(leaves)) return hit;
     // one crossing is the start, and the other lies twice as far as the closest point
-    real t = (real)(2) * crossed.middle_t, t_error = CHORD_END_ERRORS * crossed.middle_error;
+    real t = 2 * crossed.middle_t, t_error = CHORD_END_ERRORS * crossed.middle_error;
     CertainHit other = certain_crossing(ray, leaves, leaves, real_max(t - t_error, far_low),
                                         real_min(t + t_error, far_high));
     return certain_select(leaves, other, hit);
@@ -245,9 +242,8 @@ static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real 
 {
     point->curvature = real_divide((real)(1), (real)(sphere->center_radius.w));
     // the roundings of the point seen from the center
-    real sizes =
-        (real)(4) * vector_norm1(vector_of(sphere->center_radius)) + (real)(2) * vector_norm1(ray->origin);
-    point->normal_error = (real)(UNIT_ROUNDOFF)*point->curvature * sizes;
+    real sizes = 4 * vector_norm1(vector_of(sphere->center_radius)) + 2 * vector_norm1(ray->origin);
+    point->normal_error = UNIT_ROUNDOFF * point->curvature * sizes;
     return mask_none();
 }
 

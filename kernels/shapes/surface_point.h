@@ -45,7 +45,7 @@ static inline SurfacePoint surface_point_make(Vector position, Vector normal, re
 // shape's numbers that sums of exact products lose.
 static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray, real t, real shape_scale)
 {
-    real path_length = vector_norm1(ray->direction) * fabs(t), limit = shape_scale * (real)(0x1p-4f);
+    real path_length = vector_norm1(ray->direction) * fabs(t), limit = shape_scale * 0x1p-4f;
     if (RARELY(lanes_any(path_length < limit))) {
         real ray_scale = vector_norm1(ray->origin) + path_length;
         mask close = ray_scale < limit;

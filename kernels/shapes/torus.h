@@ -41,7 +41,7 @@ static inline real torus_tube_value(const TorusTube *tube, Vector x, Vector *nor
          along = vector_dot(x, tube->radial);
     real y = tube->eye_rho + along;
     real rho = real_sqrt(real_fma(y, y, off * off)), inverse_rho = real_inverse_or_zero(rho);
-    mask beyond = y <= (real)(0); // beyond the axis
+    mask beyond = y <= 0; // beyond the axis
     real sum = lanes_select(beyond, (real)(1), rho + y);
     real delta = lanes_select(beyond, rho - y, off * real_divide(off, sum));
     real change = along + delta;
@@ -71,9 +71,9 @@ static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, Interv
     for (uint i = 0; i < TORUS_ZERO_STEPS + TORUS_ZERO_STEPS; i++) {
         real slope;
         real value = torus_tube_value_at(tube, ray, t, &slope);
-        real next = bracket_narrow(&bracket, (value > (real)(0)) == entering, t, value, slope);
+        real next = bracket_narrow(&bracket, (value > 0) == entering, t, value, slope);
         // a step below the rounding may leave the bracket, whose middle is far away
-        mask settled = fabs(value) <= (real)(2 * UNIT_ROUNDOFF) * fabs(slope * t);
+        mask settled = fabs(value) <= 2 * UNIT_ROUNDOFF * fabs(slope * t);
         next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
@@ -86,14 +86,14 @@ static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, Interv
 static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ray, real low, real high,
                                             real slope_low, real slope_high)
 {
-    mask rising = slope_low < (real)(0);
+    mask rising = slope_low < 0;
     for (uint i = 0; i < TORUS_ZERO_STEPS + TORUS_ZERO_STEPS; i++) {
         real rise = slope_high - slope_low, slope;
-        real part = real_divide(-slope_low, lanes_select(rise == (real)(0), (real)(1), rise));
+        real part = real_divide(-slope_low, lanes_select(rise == 0, (real)(1), rise));
         real t = real_fma(high - low, i % 2 ? (real)(0.5f) : part, low);
         if (lanes_all((t == low) | (t == high))) break;
         torus_tube_value_at(tube, ray, t, &slope);
-        mask before = (slope < (real)(0)) == rising;
+        mask before = (slope < 0) == rising;
         low = lanes_select(before, t, low);
         slope_low = lanes_select(before, slope, slope_low);
         high = lanes_select(before, high, t);
@@ -128,16 +128,15 @@ static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit, 
     for (uint i = 1; i < TORUS_TUBE_ENDS; i++) {
         real high = real_max(torus_line_t(line, torus_tube_end(breaks, i, margin)), low);
         real after = torus_tube_value_at(&tube, ray, high, &slope_high);
-        mask entering = before > (real)(0), turns = (slope_low < (real)(0)) != (slope_high < (real)(0));
-        mask hides =
-            hit & !found & turns & (entering == (after > (real)(0))) & (entering == (slope_low < (real)(0)));
+        mask entering = before > 0, turns = (slope_low < 0) != (slope_high < 0);
+        mask hides = hit & !found & turns & (entering == (after > 0)) & (entering == (slope_low < 0));
         real end = high, value_at_end = after;
         if (lanes_any(hides)) {
             real turn = torus_tube_turning_point(&tube, ray, low, high, slope_low, slope_high);
             end = lanes_select(hides, turn, high);
             value_at_end = torus_tube_value_at(&tube, ray, end, &slope);
         }
-        mask first = hit & !found & (entering != (value_at_end > (real)(0)));
+        mask first = hit & !found & (entering != (value_at_end > 0));
         if (lanes_any(first)) {
             real_replace(t, first, torus_tube_zero(&tube, ray, (Interval){low, end}, entering));
             found = found | first;
@@ -154,8 +153,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     const real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     real closest_t;
     Vector closest = torus_closest(torus, ray, &closest_t);
-    mask hit =
-        RAY_ACTIVE(ray) & (torus_half_chord_squared(major, minor, vector_dot(closest, closest)) >= (real)(0));
+    mask hit = RAY_ACTIVE(ray) & (torus_half_chord_squared(major, minor, vector_dot(closest, closest)) >= 0);
     if (!lanes_any(hit)) return hit;
 
     const bool has_power = has_eye_power(torus->id);
@@ -170,8 +168,8 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     mask found = mask_none();
     for (uint i = 0; i + 1 < TORUS_BREAKS; i++) {
         real after = torus_line_distance(&line, breaks[i + 1]).value;
-        mask entering = before > (real)(0);
-        mask crosses = hit & !found & (entering != (after > (real)(0))) & (breaks[i + 1] > start);
+        mask entering = before > 0;
+        mask crosses = hit & !found & (entering != (after > 0)) & (breaks[i + 1] > start);
         if (lanes_any(crosses)) {
             real s = torus_zero(&line, (Interval){breaks[i], breaks[i + 1]}, entering);
             mask first = crosses & (torus_line_t(&line, s) > ray->tmin);
@@ -224,10 +222,9 @@ static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
 {
     const Vector start = vector_subtract(ray->origin, vector_of(torus->center_major));
     const real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w),
-               per_t = (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction),
-               at_start = (real)(UNIT_ROUNDOFF) *
-                          ((real)(3) * vector_norm1(start) + (real)(2) * vector_norm1(ray->origin) +
-                           (real)(28) * (major + minor));
+               per_t = 3 * UNIT_ROUNDOFF * vector_norm1(ray->direction),
+               at_start = UNIT_ROUNDOFF *
+                          (3 * vector_norm1(start) + 2 * vector_norm1(ray->origin) + 28 * (major + minor));
     return (CertainTorus){start, vector_of(torus->axis_minor), major, minor, at_start, per_t};
 }
 
@@ -240,7 +237,7 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
         torus_distance(vector_fma(torus->axis, -z, x), ray->direction, z, rise, torus->major, torus->minor);
     point.rounding = real_fma(torus->rounding_per_t, fabs(t), torus->start_rounding);
     point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
-    point.outside = point.distance.value > (real)(0);
+    point.outside = point.distance.value > 0;
     point.known = fabs(point.distance.value) > point.place;
     return point;
 }
@@ -258,11 +255,10 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     TorusPoint start = torus_point(torus, ray, (real)(0));
     real curvature = torus_curvature(torus, start.distance.rho),
          cosine = fabs(start.distance.slope) * ray_inverse_length(ray);
-    real error =
-        real_fma((real)(2) * start.place, curvature, ray->direction_error) + (real)(32 * UNIT_ROUNDOFF);
+    real error = real_fma(2 * start.place, curvature, ray->direction_error) + 32 * UNIT_ROUNDOFF;
     real least = real_divide((real)(2), curvature);
-    mask known = cosine > (real)(4) * error; // the exact one is more than the half that is used
-    return lanes_select(known, (real)(0.5f) * cosine * least * ray_inverse_length(ray), (real)(0));
+    mask known = cosine > 4 * error; // the exact one is more than the half that is used
+    return lanes_select(known, 0.5f * cosine * least * ray_inverse_length(ray), (real)(0));
 }
 
 // The search of a crossing, whose constants only choose points: the part of a point's error below which a
@@ -327,7 +323,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     TorusPoint point = torus_point(&certain, ray, before);
     const real margin = real_fma(radius, real_divide(BREAK_BEND, certain.minor), BREAK_ERRORS);
     mask outside = lanes_select(leaves, ray->leaves_outward, point.outside),
-         known = point.known & (!leaves | ((departure > (real)(0)) & (outside == point.outside))),
+         known = point.known & (!leaves | ((departure > 0) & (outside == point.outside))),
          enters = !leaves & (bounded.part.near > ray->tmin);
     outside = outside | enters;
     known = known | enters;
@@ -367,7 +363,7 @@ static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, 
     const CertainTorus certain = certain_torus(torus, ray);
     const TorusPoint at = torus_point(&certain, ray, t);
     point->curvature = torus_curvature(&certain, at.distance.rho);
-    point->normal_error = (real)(4) * at.rounding * point->curvature;
+    point->normal_error = 4 * at.rounding * point->curvature;
     return mask_none();
 }
 

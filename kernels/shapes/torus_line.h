@@ -34,7 +34,7 @@ static inline real torus_line_t(const TorusLine *line, real s)
 static inline real torus_half_chord_squared(real major, real minor, real squared_distance)
 {
     const real radius = major + minor;
-    return real_fma(radius * (real)(1.001f), radius, -squared_distance);
+    return real_fma(radius * 1.001f, radius, -squared_distance);
 }
 
 // Returns the ray's line, whose closest point to the center is given relative to that. All its lengths are
@@ -87,8 +87,8 @@ static inline TorusDistance torus_line_distance(const TorusLine *line, real s)
 // Returns the quartic's derivative, 4 s^3 + 2 p s + q.
 static inline real torus_cubic(real p, real q, real s, real *slope)
 {
-    *slope = real_fma((real)(12) * s, s, p + p);
-    return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
+    *slope = real_fma(12 * s, s, p + p);
+    return real_fma(real_fma(4 * s, s, p + p), s, q);
 }
 
 // Narrows a bracket to a side of s: the far one in the lanes where s lies `before` the zero. Returns the next
@@ -113,14 +113,14 @@ static inline real torus_turning_point(real p, real q, real low, real high)
 {
     real slope;
     real at_low = torus_cubic(p, q, low, &slope), at_high = torus_cubic(p, q, high, &slope);
-    mask crosses = (at_low < (real)(0)) != (at_high < (real)(0));
-    mask rising = at_low < (real)(0);
+    mask crosses = (at_low < 0) != (at_high < 0);
+    mask rising = at_low < 0;
     real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
     Interval bracket = {low, high};
     real s = interval_middle(bracket);
     for (uint i = 0; i < TORUS_TURNING_STEPS; i++) {
         real value = torus_cubic(p, q, s, &slope);
-        s = bracket_narrow(&bracket, (value < (real)(0)) == rising, s, value, slope);
+        s = bracket_narrow(&bracket, (value < 0) == rising, s, value, slope);
     }
     return lanes_select(crosses, s, end);
 }
@@ -131,7 +131,7 @@ static inline real torus_zero(const TorusLine *line, Interval bracket, mask ente
     real s = interval_middle(bracket);
     for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
         const TorusDistance distance = torus_line_distance(line, s);
-        mask before = (distance.value > (real)(0)) == entering;
+        mask before = (distance.value > 0) == entering;
         real next = bracket_narrow(&bracket, before, s, distance.value, distance.slope);
         if (lanes_all(next == s)) break;
         s = next;
@@ -167,10 +167,10 @@ static inline void torus_breaks(const TorusLine *line, real breaks[TORUS_BREAKS]
     const real span = real_sqrt(real_max(half_chord_squared, (real)(0)));
     real k = real_fma(line->major, line->major, line->squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
-    real p = real_fma((real)(-4) * squared_major,
-                      vector_dot(line->direction_cross_axis, line->direction_cross_axis), k + k);
-    real q = (real)(8) * squared_major * line->height * line->rise;
-    real bend = real_min(real_sqrt(real_max(-p * (real)(1.0f / 6), (real)(0))), span);
+    real p = real_fma(-4 * squared_major, vector_dot(line->direction_cross_axis, line->direction_cross_axis),
+                      k + k);
+    real q = 8 * squared_major * line->height * line->rise;
+    real bend = real_min(real_sqrt(real_max(-p * (1.0f / 6), (real)(0))), span);
     breaks[0] = -span;
     breaks[1] = torus_turning_point(p, q, -span, -bend);
     breaks[2] = torus_turning_point(p, q, -bend, bend);

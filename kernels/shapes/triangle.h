@@ -116,7 +116,7 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
          largest_squared = normal_squared * vector_dot(to_plane, to_plane);
     mask faced = plane.along * plane.along > quarter_squared * normal_squared * ray->squared;
     plane.behind =
-        faced & (plane.along * plane.height < (real)(0)) & (height_squared > error_squared * largest_squared);
+        faced & (plane.along * plane.height < 0) & (height_squared > error_squared * largest_squared);
     plane.well_conditioned = faced & (height_squared > quarter_squared * largest_squared);
     return plane;
 }
@@ -171,7 +171,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
 {
     Vector a = edges->seen.a, b = edges->seen.b, c = edges->seen.c;
     Vector max_abs = corners_max_abs(edges->seen);
-    real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(max_abs);
+    real slack = 16 * UNIT_ROUNDOFF * vector_norm1(max_abs);
     real t = accurate_t;
     Vector inverse = HAS_BOXES ? ray->inverse : ray_inverse(ray);
     t = interval_clamp(triangle_slab(a.x, b.x, c.x, slack, inverse.x), t);
@@ -179,7 +179,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
     t = interval_clamp(triangle_slab(a.z, b.z, c.z, slack, inverse.z), t);
     // the vertices' t are off by a few roundings of the largest product in them
     Vector along = ray_along(ray);
-    real t_error = (real)(4 * UNIT_ROUNDOFF) *
+    real t_error = 4 * UNIT_ROUNDOFF *
                    (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
     const CornerReals ts = corners_dot(edges->seen, along);
     return interval_clamp(
@@ -196,7 +196,7 @@ static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdg
     mask grazing = hit;
     if (!IS_DOUBLE) {
         real facing = vector_dot(triangle_normal(triangle), ray->direction);
-        grazing = grazing & (facing * facing < (real)(3 * 0x1p-4f) * ray->squared);
+        grazing = grazing & (facing * facing < 3 * 0x1p-4f * ray->squared);
     }
     if (lanes_any(grazing)) t = lanes_select(grazing, triangle_t_clamped(edges, ray, t), t);
     return t;
@@ -235,7 +235,7 @@ typedef CornerReals TriangleWeights; // barycentric coordinates of the hit point
 static inline TriangleWeights triangle_weights(Corners corners, const Ray *ray)
 {
     TriangleEdges edges = triangle_edges(corners, ray);
-    mask degenerate = edges.determinant == (real)(0);
+    mask degenerate = edges.determinant == 0;
     real inverse = real_divide((real)(1), lanes_select(degenerate, (real)(1), edges.determinant));
     return (TriangleWeights){edges.u * inverse, edges.v * inverse, edges.w * inverse};
 }

@@ -8,7 +8,7 @@
 static inline void triangle_smooth(Corners normals, TriangleWeights weights, SurfacePoint *point)
 {
     Vector normal = triangle_blend(weights, normals);
-    mask bends = vector_dot(normal, normal) > (real)(0);
+    mask bends = vector_dot(normal, normal) > 0;
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
@@ -66,7 +66,7 @@ static inline real triangle_weights_error(Corners corners, const Ray *ray, real 
 {
     const real size = vector_norm1(corners_max_abs(corners)),
                distance = vector_norm1(corners_max_abs(corners_from(corners, ray->origin)));
-    const real across = (real)(UNIT_ROUNDOFF)*real_fma((real)(6), distance, (real)(2) * size);
+    const real across = UNIT_ROUNDOFF * real_fma((real)(6), distance, 2 * size);
     return real_fma((real)(4 * UNIT_ROUNDOFF), size, divide_or(across, cosine, NEVER));
 }
 
@@ -79,7 +79,7 @@ static inline void triangle_set_normal_errors(Corners normals, TriangleWeights w
                                               real weights_error, SurfacePoint *point)
 {
     const Corners apart = corners_edges(normals);
-    real apart_squared = (real)(2) * (vector_dot(apart.a, apart.a) + vector_dot(apart.b, apart.b));
+    real apart_squared = 2 * (vector_dot(apart.a, apart.a) + vector_dot(apart.b, apart.b));
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
     point->curvature = BLENDED_NORMAL_ERROR * bend * slimness;
@@ -92,12 +92,12 @@ static inline void triangle_set_lift_error(Corners corners, TriangleHeights heig
 {
     real size = vector_norm1(corners_max_abs(corners));
     real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(corners_edges(corners))),
-                            (real)(4 * UNIT_ROUNDOFF) * size);
+                            4 * UNIT_ROUNDOFF * size);
     real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, place_error) * slimness;
     real height_error = real_fma(weight_error, heights.steepest + rounded, rounded);
     real heights_sum = heights.a + heights.b + heights.c;
-    real error = real_fma(weight_error, heights_sum + (real)(3) * height_error, height_error);
-    point->lift_error = lanes_select(side == (real)(0), (real)(0), error);
+    real error = real_fma(weight_error, heights_sum + 3 * height_error, height_error);
+    point->lift_error = lanes_select(side == 0, (real)(0), error);
 }
 
 #endif
