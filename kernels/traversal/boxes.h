@@ -45,7 +45,7 @@ static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
 {
     real origin_error = ray->origin_error;
     if (ray->ends_at_light) {
-        real reach = (real)(2) * bounds_farthest(vector_add(ray->origin, ray->direction), bounds);
+        real reach = 2 * bounds_farthest(vector_add(ray->origin, ray->direction), bounds);
         real length = vector_norm1(ray->direction);
         mask far = length > reach;
         origin_error = lanes_select(
@@ -70,7 +70,7 @@ static inline real box_slack(const Ray *ray, scalar4 bounds, scalar hit_slack)
                         bounds_place_error(ray, bounds)) -
                ray->length * ray->tmin;
     return real_fma((real)(hit_slack), bounds_farthest(ray->origin, bounds),
-                    (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
+                    BOX_ROUNDING_SLACK * UNIT_ROUNDOFF * max_norm1);
 }
 
 static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, scalar hit_slack)
@@ -92,9 +92,9 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, scalar hit_slack)
     rays.to_far = vector_add(to_plane, slack_t);
     rays.tmin = IS_CERTIFIED ? (real)(0) : ray->tmin; // the slack covers t below 0
     rays.slack = slack;
-    rays.negative_x = lanes_bits(d.x < (real)(0));
-    rays.negative_y = lanes_bits(d.y < (real)(0));
-    rays.negative_z = lanes_bits(d.z < (real)(0));
+    rays.negative_x = lanes_bits(d.x < 0);
+    rays.negative_y = lanes_bits(d.y < 0);
+    rays.negative_z = lanes_bits(d.z < 0);
     return rays;
 }
 

@@ -242,7 +242,7 @@ static inline uint tile_sees(const MacroTile *tile, const SeenRectangles *seen, 
     return lanes_bits(
         (seen->u_min.all <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= seen->u_max.all) &
         (seen->v_min.all <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= seen->v_max.all) &
-        (seen->w.all <= (real)(tile->tile_reach_max)) & (w_max >= (real)(0)));
+        (seen->w.all <= (real)(tile->tile_reach_max)) & (w_max >= 0));
 }
 
 // Returns the rectangles, one per lane, that a packet may hit.

@@ -159,14 +159,14 @@ static inline uint block_spheres_near(global const SphereBlock *block, uint coun
     const real squared_distance = vector_dot(from, from), b = vector_dot(from, direction);
     mask near = mask_all();
 #if IS_CERTIFIED
-    const real distance = vector_norm1(from) + (real)(3) * radius + vector_norm1(origin),
-               per_distance = real_of_lane(&ray->direction_error, lane) + (real)(32 * UNIT_ROUNDOFF);
+    const real distance = vector_norm1(from) + 3 * radius + vector_norm1(origin),
+               per_distance = real_of_lane(&ray->direction_error, lane) + 32 * UNIT_ROUNDOFF;
     radius = radius + real_fma(per_distance, distance, real_of_lane(&ray->origin_error, lane));
 #else
     near = !ray_leaves_sphere(from, direction, real_of_lane(&ray->tmin, lane), radius);
 #endif
     near = near & !(b * (b * inverse_squared) <
-                    real_fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF)));
+                    real_fma(-radius, radius, squared_distance * (1 - 32 * UNIT_ROUNDOFF)));
     return lanes_bits(near) & ((1u << count) - 1);
 }
 

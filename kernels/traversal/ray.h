@@ -65,7 +65,7 @@ static inline mask hit_found(const Hit *hit)
 
 static inline real real_inverse_or_zero(real a)
 {
-    mask zero = a == (real)(0);
+    mask zero = a == 0;
     return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
 }
 
@@ -74,7 +74,7 @@ static inline real real_inverse_or_zero(real a)
 // box exactly at its face. BVH boxes, which have slack, do without.
 static inline real real_inverse_or_huge(real a)
 {
-    mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
+    mask zero = a == 0, steps = fabs(a) > SMALLEST_RATIO;
     real inverse = real_divide((real)(1), lanes_select(zero, (real)(1), a));
     if ((HAS_BOXES | HAS_TRIANGLES) & !IS_COMPENSATED)
         inverse = lanes_select(steps, real_fma(real_fma(-a, inverse, (real)(1)), inverse, inverse), inverse);
@@ -86,7 +86,7 @@ static inline real real_inverse_or_huge(real a)
 // saves the divisions).
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
-    real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
+    real side = lanes_select(d.z >= 0, (real)(1), (real)(-1));
     real norm = vector_norm(d);
     real w = real_fma(side, norm, d.z);
     real norm_w = norm * w;
@@ -126,7 +126,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         if (HAS_SMOOTH_NORMALS) ray.is_lifted = ray.sinks = mask_none();
         if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
     }
-    ray.active = active & (ray.squared > (real)(0));
+    ray.active = active & (ray.squared > 0);
     // 0 in inactive lanes, which only a sphere around the origin still examines
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
@@ -177,7 +177,7 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
     if (IS_CERTIFIED) ray.length = BOUND_SLACK;
     if (IS_COMPENSATED) return ray;
-    ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
+    ray.inverse_squared = lanes_select(ray.active, 2 - ray.squared, (real)(0));
     return ray;
 }
 
@@ -186,7 +186,7 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask skip
 {
     ray->common_origin = common_origin;
     if (!IS_CERTIFIED) return;
-    real slack = (real)(CERTIFIED_CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * ray->squared;
+    real slack = CERTIFIED_CULL_DIRECTION_SLACK * UNIT_ROUNDOFF * ray->squared;
     if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
     ray->cull_slack = lanes_select(skips_culling, (real)(LARGEST), slack);
 }
@@ -197,7 +197,7 @@ static inline real ray_cull_slack(const Ray *ray)
 {
     if (IS_CERTIFIED) return ray->cull_slack;
     if (ray->common_origin == COMMON_ORIGIN_EYE) return (real)(0);
-    return (real)(CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * ray->squared;
+    return CULL_DIRECTION_SLACK * UNIT_ROUNDOFF * ray->squared;
 }
 
 // Returns near_t, or far_t if near_t is not beyond the ray's start, for crossings near_t <= far_t.

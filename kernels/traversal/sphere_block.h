@@ -44,11 +44,11 @@ static inline uint spheres_see(SphereView *view, const MacroTile *tile, global c
     view->seen.w.all = from.z - radius - slack;
     const real size = vector_norm1(from) + radius;
     // too close to the common origin for the slopes to be bounded
-    const mask anywhere = !((real)(16) * from.z > size);
+    const mask anywhere = !(16 * from.z > size);
     const real inverse =
         lanes_select(anywhere, (real)(0), reciprocal_estimate(lanes_select(anywhere, (real)(1), from.z)));
     const real distance = size + (real)(frame->leaving ? 0 : tile->tile_reach_max * tile->ray_per_w);
-    real error = distance * (real)(SPHERE_BLOCK_ERROR * UNIT_ROUNDOFF);
+    real error = distance * (SPHERE_BLOCK_ERROR * UNIT_ROUNDOFF);
     if (IS_CERTIFIED) error = tile_point_error(tile, distance);
     const real enlarged = (radius + error) * inverse, u = from.x * inverse, v = from.y * inverse;
     const real reach = lanes_select(anywhere, (real)(LARGEST), enlarged * (real)(tile->ray_per_w));

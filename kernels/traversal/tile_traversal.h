@@ -18,7 +18,7 @@ static inline real box_slope_min(real a, real b)
 {
     real least = real_min(a, b);
     return real_fma(fabs(least), (real)(-BOX_SLOPE_SLACK * UNIT_ROUNDOFF), least) -
-           (real)(RAY_SLOPE_SLACK * UNIT_ROUNDOFF);
+           RAY_SLOPE_SLACK * UNIT_ROUNDOFF;
 }
 
 // Returns the children, as bits, whose boxes the macro-tile may hit.

@@ -93,7 +93,7 @@ static inline BlockVertices block_load(const MacroTile *tile, global const Trian
     at.high = real_max_of_3(at.a.z, at.b.z, at.c.z);
     real longest_squared =
         real_max_of_3(vector_dot(at.ab, at.ab), vector_dot(at.bc, at.bc), vector_dot(at.ca, at.ca));
-    at.longest = (real)(1.0001f) * device_sqrt(longest_squared);
+    at.longest = 1.0001f * device_sqrt(longest_squared);
     const real per_w = (real)(tile->ray_per_w);
     at.to_vertices = at.distance = real_fma(per_w, at.high, at.longest);
     if (!frame->leaving)
@@ -128,7 +128,7 @@ static inline real block_vertex_error(const MacroTile *tile, const BlockVertices
     // the full test's error counts from the ray's start
     real from_start = tile->frame.leaving ? distance : real_fma(at->low, (real)(-tile->ray_per_w), distance);
     return real_fma(from_start, (real)(VERTEX_TEST_ERROR * UNIT_ROUNDOFF),
-                    distance * (real)(VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF));
+                    distance * (VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF));
 }
 
 // Sets the edges and their error, and for shadow rays what certain answers need.
@@ -145,10 +145,10 @@ static inline void block_set_edges(BlockView *view, const MacroTile *tile, const
     if (IS_CERTIFIED) width = real_fma((real)(4), vertex_error, width);
     real error = real_fma(vertex_error * (real)(tile->ray_per_w), width, (real)(SMALLEST_RATIO));
     // edge-on, rounding decides the sign, and values inside are small
-    real volume_error = (real)(12 * UNIT_ROUNDOFF) * at->longest * at->to_vertices * at->to_vertices;
-    mask in_range = (volume_error > (real)(SMALLEST_RATIO)) & (fabs(volume) < (real)(LARGEST));
+    real volume_error = 12 * UNIT_ROUNDOFF * at->longest * at->to_vertices * at->to_vertices;
+    mask in_range = (volume_error > SMALLEST_RATIO) & (fabs(volume) < LARGEST);
     mask has_sign = in_range & (fabs(volume) > volume_error);
-    real signless_error = lanes_select(in_range & !at->is_near, (real)(24) * error, (real)(LARGEST));
+    real signless_error = lanes_select(in_range & !at->is_near, 24 * error, (real)(LARGEST));
     view->error.all = lanes_select(has_sign, error, signless_error);
     if (IS_CERTIFIED) return;
     if (!is_shadow) return;
@@ -174,10 +174,10 @@ static inline mask starts_before(Vector normal, real normal_squared, real longes
     real squared =
         real_max(normal_squared, (real)(SMALLEST_RATIO)) * real_fma(u, u, real_fma(v, v, (real)(1)));
     // the full test asks for 1/16, of a normal that may differ by a sixth where the height is barely enough
-    mask is_faced = along * along > (real)(0.18f) * squared;
+    mask is_faced = along * along > 0.18f * squared;
     // in this order the product underflows only where the square on the left does
-    real error = (real)(24 * UNIT_ROUNDOFF) * longest * longest;
-    return is_faced & (along * height > (real)(0)) &
+    real error = 24 * UNIT_ROUNDOFF * longest * longest;
+    return is_faced & (along * height > 0) &
            (height * height > vector_dot(to_plane, to_plane) * error * error);
 }
 
