@@ -32,7 +32,7 @@ typedef struct {
 
 static inline mask bounce_is_active(const Bounce *bounce)
 {
-    return (bounce->weight.x > (real)(0)) | (bounce->weight.y > (real)(0)) | (bounce->weight.z > (real)(0));
+    return (bounce->weight.x > 0) | (bounce->weight.y > 0) | (bounce->weight.z > 0);
 }
 
 static inline Ray bounce_ray(const Bounce *bounce)
@@ -82,7 +82,7 @@ static inline Vector surface_reflect(const Surface *surface, Vector direction)
 {
     Vector reflected = vector_reflect(direction, surface->shading_normal);
     if (!HAS_SHADING_NORMALS) return reflected;
-    mask inward = vector_dot(reflected, surface->normal) <= (real)(0);
+    mask inward = vector_dot(reflected, surface->normal) <= 0;
     return vector_select(inward, vector_reflect(direction, surface->normal), reflected);
 }
 
@@ -93,7 +93,7 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
     mask total =
         vector_refract(direction, surface->shading_normal, surface->entering, surface->ior, refracted);
     if (!HAS_SHADING_NORMALS) return total;
-    mask outward = !total & (vector_dot(*refracted, surface->normal) >= (real)(0));
+    mask outward = !total & (vector_dot(*refracted, surface->normal) >= 0);
     if (!lanes_any(outward)) return total;
     Vector plain;
     mask plain_total = vector_refract(direction, surface->normal, surface->entering, surface->ior, &plain);
@@ -139,8 +139,7 @@ static inline Color3 weight_cut(Color3 weight, real least, mask *uncertain)
 {
     real largest = weight_largest(weight);
     if (IS_CERTIFIED)
-        *uncertain =
-            *uncertain | ((largest > (real)(0)) & (fabs(largest - least) <= WEIGHT_ROUNDING * least));
+        *uncertain = *uncertain | ((largest > 0) & (fabs(largest - least) <= WEIGHT_ROUNDING * least));
     return vector_select(largest < least, color_gray((real)(0)), weight);
 }
 
@@ -182,7 +181,7 @@ static inline void surface_bounce(const Surface *surface, Vector direction, Colo
                         : weight_part(weight, transmission);
         bounces->total = total & transparent;
     }
-    if (all || lanes_any(reflection + kept > (real)(0))) {
+    if (all || lanes_any(reflection + kept > 0)) {
         reflected->direction = surface_reflect(surface, direction);
         reflected->origin = secondary_ray_origin(surface, false);
         reflected->weight = reflected_weight(surface, direction, weight, reflection, kept);

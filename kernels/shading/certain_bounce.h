@@ -99,7 +99,7 @@ static inline void refracted_set_chord(const Surface *surface, const Snell *snel
     real inverse_ior = real_divide((real)(1), surface->ior);
     Chord chord = chord_start(end, surface->place_error, snell->root * inverse_ior, NEVER,
                               real_fma(angle_error, inverse_ior, computed + end->normal));
-    bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= (real)(1)));
+    bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= 1));
     // the steepness in the plane of incidence; across it this is n, which is more where n < 1
     real steepest = real_max(real_divide(snell->s + snell->s_error, snell->least_root), snell->scale);
     real turned = real_fma(steepest, end->turn + end->normal, end->normal);

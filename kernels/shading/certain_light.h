@@ -84,14 +84,14 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
 {
     Ray *shadow_ray = &to_light->shadow_ray;
     shadow_ray->ends_at_light = true;
-    errors->place = errors->place + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
+    errors->place = errors->place + 2 * UNIT_ROUNDOFF * vector_norm1(vector_of(light->position));
     // avoids another root; the unit vector is off by 14.5 u, the dot product by 3 u
     if (!HAS_SMOOTH_NORMALS)
         shadow_ray->length =
-            vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
+            vector_dot(to_light->direction, shadow_ray->direction) * (1 + 24 * UNIT_ROUNDOFF);
     // nothing is known of a light so near that rounding moves it onto the surface, or too far away to square
     real squared = shadow_ray->squared;
-    mask in_range = (squared >= (real)(SMALLEST_RATIO)) & (squared <= (real)(1 / SMALLEST_RATIO));
+    mask in_range = (squared >= SMALLEST_RATIO) & (squared <= 1 / SMALLEST_RATIO);
     real nearest = ray_inverse_length(shadow_ray);
     if (HAS_SMOOTH_NORMALS) { // the light's distance from the position may be less
         Vector to_position = vector_add(shadow_ray->direction, surface->lift);
@@ -101,7 +101,7 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
     real relative = lanes_select(in_range, errors->place * nearest, NEVER);
     errors->far_off = !(relative <= SHADOW_UNCERTAIN_MAX);
     errors->skips_culling =
-        (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
+        (relative > SHADOW_ERROR_MAX * UNIT_ROUNDOFF) | (squared * squared < CULLED_DISTANCE_MIN);
     errors->angle = errors->angle + relative + relative;
     if (HAS_FADING_LIGHTS) {
         errors->strength = real_fma(FADING_ERROR, relative, (real)(32 * UNIT_ROUNDOFF));
@@ -119,8 +119,8 @@ static inline Bounded light_set_side(const Surface *surface, LightRay *to_light,
     if (HAS_SMOOTH_NORMALS) { // the shadow ray, not parallel to the light's direction, must leave the surface
         cosine.value =
             vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
-        cosine.error = cosine.error + (real)(96 * UNIT_ROUNDOFF);
-        shadow_ray->is_lifted = surface->lift_error > (real)(0);
+        cosine.error = cosine.error + 96 * UNIT_ROUNDOFF;
+        shadow_ray->is_lifted = surface->lift_error > 0;
         shadow_ray->sinks = shadow_ray->is_lifted & (cosine.value < -cosine.error);
     }
     shadow_ray->leaves_outward = surface->entering & (cosine.value > cosine.error);
@@ -164,8 +164,8 @@ static inline void light_add_spot_errors(const Light *light, const Surface *surf
     const Vector from_light = vector_negate(to_light->direction), axis = vector_of(light->direction);
     real s = cosine_complement(from_light, axis), edge = (real)(light->cone.x);
     real error = errors->angle + DIRECTION_ROUNDING;
-    real s_error = error * (vector_norm(vector_subtract(from_light, axis)) + error) +
-                   (real)(16 * UNIT_ROUNDOFF) * (s + edge);
+    real s_error =
+        error * (vector_norm(vector_subtract(from_light, axis)) + error) + 16 * UNIT_ROUNDOFF * (s + edge);
     mask at_edge = !turned & (fabs(s - edge) <= s_error);
     real brightness = light_brightness(surface, errors->brightest);
     mask fades = s_error * (real)(light->cone.z) * brightness <= FACING_ERROR_MAX;

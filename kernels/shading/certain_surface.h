@@ -8,7 +8,7 @@
 // Returns a lower bound on the cosine of the exact ray's incidence on a plane, or 0.
 static inline real least_cosine(Vector normal, const Ray *ray)
 {
-    const real error = ray->direction_error + (real)(128 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
+    const real error = ray->direction_error + (128 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
     return real_max(fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) - error, (real)(0));
 }
 
@@ -27,8 +27,7 @@ static inline void surface_narrow_place(Surface *surface, mask lanes, real heigh
 {
     const real one = (real)(1), across = surface->line_error;
     lanes = lanes & (cosine > NARROWED_COSINE_MIN);
-    const real sine =
-        real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + (real)(16 * UNIT_ROUNDOFF));
+    const real sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + 16 * UNIT_ROUNDOFF);
     const real along = real_divide(real_fma(across, sine, height), lanes_select(lanes, cosine, one));
     const real both = hypotenuse_above(across, along);
     real_replace(&surface->place_error, lanes, real_min(surface->place_error, NARROWED_SLACK * both));
@@ -42,8 +41,7 @@ static inline void surface_start_errors(Surface *surface, const Ray *ray, const 
     surface->uncertain = hit->uncertain;
     if (HAS_CHORDS) surface->chord_end = chord_end_none();
     real length = ray->length * BOUND_SLACK, t = fabs(hit->t);
-    real rounding =
-        (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
+    real rounding = 2 * UNIT_ROUNDOFF * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
     real across = ray_place_error(ray, length * t),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
     surface->place_error = real_fma(PLACE_SLACK, hypotenuse_above(across, along), rounding);

@@ -51,12 +51,10 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
     real rounding = vector_norm1(ray->origin) + vector_norm1(ray->direction) * fabs(hit->t);
     ChordEnd end = chord_end_none();
     end.off = CHORD_OFF_FACTOR * (fabs(radius - distance) +
-                                  (real)(UNIT_ROUNDOFF) * ((real)(12) * distance + (real)(4) * radius +
-                                                           (real)(2) * center1 + (real)(6) * rounding));
+                                  UNIT_ROUNDOFF * (12 * distance + 4 * radius + 2 * center1 + 6 * rounding));
     real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray_inverse_length(ray);
     real moved = divide_or(end.off, cosine, NEVER);
-    end.normal = inverse * (moved + (real)(UNIT_ROUNDOFF) * ((real)(4) * center1 + (real)(2) * rounding)) +
-                 DIRECTION_ROUNDING;
+    end.normal = inverse * (moved + UNIT_ROUNDOFF * (4 * center1 + 2 * rounding)) + DIRECTION_ROUNDING;
     mask usable = lanes & (moved <= CHORD_MOVE_MAX * cosine * radius);
     end.radius = lanes_select(usable, radius, (real)(0));
     mask continues = usable & (hit->object == ray->origin_object) & (ray->chord_turn < NEVER);
@@ -87,16 +85,16 @@ static inline Chord chord_start(const ChordEnd *end, real place_error, real cosi
 {
     real moved = divide_or(end->off, cosine, NEVER);
     mask continues = end->turn < NEVER;
-    real sine_squared = real_min((real)(1) + CHORD_TURN_MAX - cosine * cosine, (real)(1));
+    real sine_squared = real_min(1 + CHORD_TURN_MAX - cosine * cosine, (real)(1));
     real unrolled = real_fma(ARC_RISE, sine_squared, ARC_LEAST);
-    real inverse = real_divide((real)(1), lanes_select(end->radius > (real)(0), end->radius, (real)(1)));
+    real inverse = real_divide((real)(1), lanes_select(end->radius > 0, end->radius, (real)(1)));
     real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
     real turn = lanes_select(continues, end->turn, (real)(0)) + added,
          place = lanes_select(continues, end->place, place_error) + moved;
     // roundings of these sums are below u of the radius; the ends' own bounds have more slack
-    real end_place = real_fma((real)(2) * end->radius, turn, place);
-    mask usable = (end->radius > (real)(0)) & (moved <= CHORD_MOVE_MAX * cosine * end->radius) &
-                  (turn <= CHORD_TURN_MAX);
+    real end_place = real_fma(2 * end->radius, turn, place);
+    mask usable =
+        (end->radius > 0) & (moved <= CHORD_MOVE_MAX * cosine * end->radius) & (turn <= CHORD_TURN_MAX);
     return (Chord){lanes_select(usable, turn, NEVER), lanes_select(usable, end_place, NEVER),
                    lanes_select(usable, real_fma(place, inverse, turn), NEVER)};
 }

@@ -10,17 +10,16 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     if (IS_CERTIFIED) surface_set_errors(surface, point, ray);
     surface->position = point->position;
     if (HAS_SMOOTH_NORMALS) surface->lift = point->lift;
-    mask along = vector_dot(point->normal, ray->direction) > (real)(0);
+    mask along = vector_dot(point->normal, ray->direction) > 0;
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
     Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
     if (HAS_SHADING_NORMALS) surface->normal = normal;
-    mask opposite = vector_dot(point->shading_normal, normal) < (real)(0);
+    mask opposite = vector_dot(point->shading_normal, normal) < 0;
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
     if (IS_CERTIFIED) return; // rays start on the surface
-    surface->error =
-        (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
-                                       (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
+    surface->error = UNIT_ROUNDOFF * real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
+                                              POINT_POSITION_ERROR * vector_norm1(point->position));
     if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
 }
 

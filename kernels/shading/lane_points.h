@@ -61,9 +61,8 @@ static inline mask floor_is_uncertain(real a, real error)
 static inline real cubes_error(const SurfacePoint *point, scalar4 grid, real place_error)
 {
     const real per_unit = (real)(fabs(grid.w));
-    return per_unit * place_error + (real)(2 * CHECKER_DEPTH) * point_normal_error(point, place_error) +
-           (real)(8 * UNIT_ROUNDOFF) *
-               (per_unit * vector_norm1(point->position) + vector_norm1(vector_of(grid)) + (real)(1));
+    return per_unit * place_error + 2 * CHECKER_DEPTH * point_normal_error(point, place_error) +
+           8 * UNIT_ROUNDOFF * (per_unit * vector_norm1(point->position) + vector_norm1(vector_of(grid)) + 1);
 }
 
 // Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
@@ -80,7 +79,7 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const
         cell = (Vector){square.u, square.v, (real)(0.5f)};
         if (IS_CERTIFIED) error = grid_error(scene, type, index, point->position, place_error);
     } else {
-        mask along = vector_dot(point->normal, ray->direction) > (real)(0);
+        mask along = vector_dot(point->normal, ray->direction) > 0;
         Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
         cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
         cell = vector_fma(inward, (real)(CHECKER_DEPTH), cell);
@@ -89,7 +88,7 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const
     if (IS_CERTIFIED)
         hit->uncertain = hit->uncertain | floor_is_uncertain(cell.x, error) |
                          floor_is_uncertain(cell.y, error) | floor_is_uncertain(cell.z, error);
-    const real halved = (real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z)) * (real)(0.5f);
+    const real halved = (real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z)) * 0.5f;
     return real_floor(halved) != halved;
 }
 

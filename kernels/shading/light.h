@@ -40,7 +40,7 @@ static inline bool light_has_area(const Light *light)
 static inline real cosine_complement(Vector a, Vector b)
 {
     Vector difference = vector_subtract(a, b);
-    return (real)(0.5f) * vector_dot(difference, difference);
+    return 0.5f * vector_dot(difference, difference);
 }
 
 // Returns 1 in a spotlight's full cone, 0 outside it, and a smooth value between.
@@ -96,7 +96,7 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
     if (sample.index == SAMPLE_CENTER) sample.index = 0;
     SquarePoint point = sample_point(&sample, SAMPLED_LIGHTS + index);
     const real one = (real)(1);
-    real columns = (point.x + one) * (real)(SKY_COLUMNS / 2), rows = (point.y + one) * (real)(SKY_ROWS / 2);
+    real columns = (point.x + one) * (SKY_COLUMNS / 2), rows = (point.y + one) * (SKY_ROWS / 2);
     RealLanes column = {floor(columns)}, row = {floor(rows)};
     RealLanes longitude, longitudes, sine, sines;
     for (uint lane = 0; lane < LANES; lane++) {

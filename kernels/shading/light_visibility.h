@@ -13,7 +13,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     LightRay to_light = light_ray(scene, &light, index, surface);
     LightVisibility visibility;
     visibility.fraction = to_light.strength;
-    visibility.lit = surface_found(surface) & (to_light.facing > (real)(0)) & (to_light.strength > (real)(0));
+    visibility.lit = surface_found(surface) & (to_light.facing > 0) & (to_light.strength > 0);
     to_light.shadow_ray.active = to_light.shadow_ray.active & visibility.lit;
     mask skips_culling = mask_none();
     if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &to_light, &visibility);
@@ -34,7 +34,7 @@ static inline void light_occlude(LightVisibility *visibility, const Traversal *o
         visibility->uncertain = visibility->uncertain | (occlusion->hit.uncertain & visibility->lit);
         visibility->color_error = visibility->color_error * lanes_select(visibility->lit, passing, (real)(1));
     }
-    visibility->lit = visibility->lit & (passing > (real)(0));
+    visibility->lit = visibility->lit & (passing > 0);
     visibility->fraction = visibility->fraction * passing;
 }
 

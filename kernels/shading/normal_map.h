@@ -17,8 +17,8 @@ static inline Tangents triangle_tangents(Corners corners, Corners uvs)
     Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a);
     Vector uv_ab = vector_subtract(uvs.b, uvs.a), uv_ac = vector_subtract(uvs.c, uvs.a);
     real area = difference_of_products(uv_ab.x, uv_ac.y, uv_ab.y, uv_ac.x);
-    real side = lanes_select(area < (real)(0), (real)(-1), (real)(1));
-    side = lanes_select(area == (real)(0), (real)(0), side);
+    real side = lanes_select(area < 0, (real)(-1), (real)(1));
+    side = lanes_select(area == 0, (real)(0), side);
     Tangents tangents;
     tangents.u = vector_fma(ab, side * uv_ac.y, vector_scale(ac, -side * uv_ab.y));
     tangents.v = vector_fma(ac, side * uv_ab.x, vector_scale(ab, -side * uv_ac.x));

@@ -8,15 +8,15 @@
 static inline Vector vector_reflect(Vector direction, Vector normal)
 {
     real away = vector_dot(direction, normal);
-    return vector_renormalize(vector_fma(normal, (real)(-2) * away, direction));
+    return vector_renormalize(vector_fma(normal, -2 * away, direction));
 }
 
 // Returns the square under the root of vector_refract, which is c^2 + k for s = c on entering a body of
 // index n, and s^2 - k for s = n c on leaving it. It is negative in total internal reflection.
 static inline real refraction_squared(real s, mask entering, real ior)
 {
-    real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
-    return difference_of_products(s, s, above_one, ior + (real)(1));
+    real above_one = lanes_select(entering, 1 - ior, ior - 1);
+    return difference_of_products(s, s, above_one, ior + 1);
 }
 
 // Returns (a - b) / (a + b) for a and b >= 0, and 0 where both are 0.
@@ -38,7 +38,7 @@ static inline real fresnel_reflectance(Vector direction, Vector normal, mask ent
     real across = relative_difference(s, root);
     real along = relative_difference(s * lanes_select(entering, ior * ior, one),
                                      root * lanes_select(entering, one, ior * ior));
-    real reflectance = (real)(0.5f) * real_fma(across, across, along * along);
+    real reflectance = 0.5f * real_fma(across, across, along * along);
     return lanes_select(squared < zero, one, reflectance);
 }
 
@@ -50,17 +50,16 @@ static inline real fresnel_reflectance(Vector direction, Vector normal, mask ent
 static inline real conductor_channel(real cosine, real index_real, real index_imaginary_squared)
 {
     const real zero = (real)(0), one_half = (real)(0.5f);
-    const real cosine_squared = cosine * cosine, sine_squared = (real)(1) - cosine_squared;
+    const real cosine_squared = cosine * cosine, sine_squared = 1 - cosine_squared;
     real difference = index_real - sine_squared;                                     // a^2 - b^2
     real sum = real_sqrt(real_fma(difference, difference, index_imaginary_squared)); // a^2 + b^2
     real larger = one_half * (sum + fabs(difference));
-    real smaller =
-        real_divide((real)(0.25f) * index_imaginary_squared, real_max(larger, (real)(SMALLEST_RATIO)));
+    real smaller = real_divide(0.25f * index_imaginary_squared, real_max(larger, (real)(SMALLEST_RATIO)));
     real twice_a_c = (cosine + cosine) * real_sqrt(lanes_select(difference < zero, smaller, larger));
     real across = real_max(relative_difference(sum + cosine_squared, twice_a_c), zero);
     real rest = relative_difference(real_fma(cosine_squared, sum, sine_squared * sine_squared),
                                     twice_a_c * sine_squared);
-    return one_half * across * ((real)(1) + real_max(rest, zero));
+    return one_half * across * (1 + real_max(rest, zero));
 }
 
 // Refracts a unit direction by Snell's law at a unit normal that faces it. Returns the lanes of total
@@ -72,7 +71,7 @@ static inline mask vector_refract(Vector direction, Vector normal, mask entering
     real scale = lanes_select(entering, (real)(1), ior);
     real scaled = scale * -vector_dot(direction, normal);
     real squared = refraction_squared(scaled, entering, ior);
-    mask total = squared < (real)(0);
+    mask total = squared < 0;
     real cosine = real_sqrt(real_max(squared, (real)(0)));
     *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, scale)));
     return total;

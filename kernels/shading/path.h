@@ -45,7 +45,7 @@ static inline void hit_add_light(const Scene *scene, uint index, LightVisibility
     light_occlude(light, occlusion);
     if (IS_CERTIFIED) {
         // where the facing is uncertain, only highlights count
-        const mask glossy = hit->surface.specular > (real)(0), faint = light->facing_uncertain & !glossy;
+        const mask glossy = hit->surface.specular > 0, faint = light->facing_uncertain & !glossy;
         hit->uncertain = hit->uncertain | (light->uncertain & !faint) | (light->facing_uncertain & glossy);
         hit->color_error = hit->color_error +
                            lanes_select(light->lit | light->facing_uncertain, light->color_error, (real)(0));

@@ -12,7 +12,7 @@ static inline real highlight_power(mask wanted, real s, real shininess)
     if (lanes_any(wanted & nonzero))
         highlight = lanes_select(
             nonzero, real_complement_power(lanes_select(nonzero, s, (real)(0.5f)), shininess), highlight);
-    return lanes_select(shininess == (real)(0), (real)(1), highlight);
+    return lanes_select(shininess == 0, (real)(1), highlight);
 }
 
 // Returns the light's direction mirrored by the shading normal.
@@ -26,7 +26,7 @@ static inline Vector light_mirrored(const Surface *surface, const LightRay *ligh
 static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_light, mask lit)
 {
     Color3 color = vector_scale(surface->diffuse, to_light->facing);
-    mask glossy = lit & (surface->specular > (real)(0));
+    mask glossy = lit & (surface->specular > 0);
     if (!lanes_any(glossy)) return color;
     // s is 1 minus the cosine between the mirrored light and the eye's direction
     const real s = cosine_complement(light_mirrored(surface, to_light), surface->to_eye);

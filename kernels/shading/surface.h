@@ -46,7 +46,7 @@ static inline mask surface_found(const Surface *surface)
 
 static inline mask surface_is_transparent(const Surface *surface)
 {
-    return HAS_TRANSMISSION ? surface->transmission > (real)(0) : mask_none();
+    return HAS_TRANSMISSION ? surface->transmission > 0 : mask_none();
 }
 
 // Returns the geometric normal, facing the ray.
@@ -73,13 +73,13 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
         vector_replace(&surface->specular_tint, lanes, vector_of(material->specular_tint));
     }
     if (HAS_CONDUCTORS) {
-        surface->conductor = surface->conductor | (lanes & ((real)(material->conductor_real.w) > (real)(0)));
+        surface->conductor = surface->conductor | (lanes & ((real)(material->conductor_real.w) > 0));
         vector_replace(&surface->conductor_real, lanes, vector_of(material->conductor_real));
         vector_replace(&surface->conductor_imaginary_squared, lanes,
                        vector_of(material->conductor_imaginary_squared));
     }
     if (HAS_FRESNEL)
-        surface->fresnel = surface->fresnel | (lanes & ((real)(material->reflection_tint.w) > (real)(0)));
+        surface->fresnel = surface->fresnel | (lanes & ((real)(material->reflection_tint.w) > 0));
     if (!HAS_TRANSMISSION) return;
     real_replace(&surface->transmission, lanes, (real)(bounces.y));
     real_replace(&surface->ior, lanes, (real)(bounces.z));

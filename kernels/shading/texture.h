@@ -82,7 +82,7 @@ static inline real grid_error(const Scene *scene, uint type, uint index, Vector 
     const real moved = real_max(vector_norm1(u), vector_norm1(v)),
                size = real_max(vector_norm1_along(u, position) + (real)(fabs(axes.u.w)),
                                vector_norm1_along(v, position) + (real)(fabs(axes.v.w)));
-    return real_fma(moved, place_error, (real)(8 * UNIT_ROUNDOFF) * size);
+    return real_fma(moved, place_error, 8 * UNIT_ROUNDOFF * size);
 }
 
 static inline TextureCoordinates texture_coordinates(const Scene *scene, uint type, uint index,

@@ -89,8 +89,8 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     real side = triangles.liftable;
     if (triangles.smooth) {
         triangle_smooth(normals, weights, &hit.point);
-        mask along = vector_dot(hit.point.normal, ray->direction) > (real)(0),
-             opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < (real)(0);
+        mask along = vector_dot(hit.point.normal, ray->direction) > 0,
+             opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < 0;
         side = lanes_select(along ^ opposite, -side, side);
         heights = triangle_lift(corners, normals, weights, side, &hit.point);
     }

@@ -64,12 +64,12 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     Ray inward = ray_make_unit(secondary_ray_origin(surface, false), vector_negate(surface_normal(surface)),
                                transparent);
     inward.tmin = error;
-    inward.tmax = offset + (real)(3) * error;
+    inward.tmax = offset + 3 * error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     mask found = hit_found(&opaque);
     real gap = opaque.t - offset;
     mask touches = found & (gap <= error);
-    real_replace(&surface->refracted_offset, found & !touches, (real)(0.5f) * gap);
+    real_replace(&surface->refracted_offset, found & !touches, 0.5f * gap);
     hit->object = lanes_select(touches, opaque.object, hit->object);
     return touches;
 }
