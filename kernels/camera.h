@@ -17,7 +17,7 @@ static inline Vector equirectangular_direction(global const SceneHeader *header,
     real longitude = x * (real)(header->right.w), latitude = y * (real)(header->up.w);
     Vector level = vector_of_turns(vector_of(header->forward), vector_of(header->right), longitude);
     return vector_fma(vector_of(header->up), real_sine_of_turns(latitude),
-                      vector_scale(level, real_sine_of_turns((real)(0.25f) - fabs(latitude))));
+                      vector_scale(level, real_sine_of_turns(0.25f - fabs(latitude))));
 }
 
 // Returns the ray of sample `index`, through a point of each pixel. dx and dy run from -1 to 1 across the

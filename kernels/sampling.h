@@ -105,7 +105,7 @@ static inline SquarePoint disc_of_square(SquarePoint point)
 {
     mask is_wide = fabs(point.x) > fabs(point.y);
     real radius = lanes_select(is_wide, point.x, point.y), across = lanes_select(is_wide, point.y, point.x);
-    mask is_center = radius == (real)(0);
+    mask is_center = radius == 0;
     real turn = real_divide(across, lanes_select(is_center, (real)(1), radius)), squared = turn * turn;
     real series = real_fma(squared, (real)(0x1.507834p-22f), (real)(-0x1.32d2ccp-15f));
     series = real_fma(squared, series, (real)(0x1.466bc6p-9f));
@@ -123,8 +123,8 @@ static inline SquarePoint disc_of_square(SquarePoint point)
 static inline SquarePoint triangle_of_square(SquarePoint point)
 {
     mask is_above = point.y > point.x;
-    real low = (real)(0.25f) * lanes_select(is_above, point.x, point.y);
-    real high = (real)(0.5f) * lanes_select(is_above, point.y, point.x) - low;
+    real low = 0.25f * lanes_select(is_above, point.x, point.y);
+    real high = 0.5f * lanes_select(is_above, point.y, point.x) - low;
     return (SquarePoint){lanes_select(is_above, low, high), lanes_select(is_above, high, low)};
 }
 

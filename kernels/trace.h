@@ -44,14 +44,13 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     Vector origin = vector_load(value + RAY_ORIGIN), direction = vector_load(value + RAY_DIRECTION);
     Ray ray = ray_make(origin, direction, value[RAY_TMIN].all, value[RAY_TMAX].all, mask_all());
     if (IS_CERTIFIED) { // the host rounded each component once
-        ray.origin_error = (real)(UNIT_ROUNDOFF)*vector_norm1(origin);
+        ray.origin_error = UNIT_ROUNDOFF * vector_norm1(origin);
         ray.direction_error = (real)(2 * UNIT_ROUNDOFF);
     }
     Hit hit = closest_hit(scene, &ray);
     if (IS_CERTIFIED) {
         const real size = vector_norm1(origin);
-        const mask in_range =
-            (size == (real)(0)) | ((size >= (real)(ORIGIN_MIN)) & (size < (real)(ORIGIN_MAX)));
+        const mask in_range = (size == 0) | ((size >= ORIGIN_MIN) & (size < ORIGIN_MAX));
         hit.uncertain = hit.uncertain | !(ray.active & in_range);
     }
     Surface surface = surface_interaction(scene, &ray, &hit);
