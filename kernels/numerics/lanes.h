@@ -1,10 +1,12 @@
 // Defines packet width and precision. A work-item traces packets of LANES rays, one per lane.
 //
 // Above this file, code reads like the scalar algorithm, with a mask where that would branch. A mask is the
-// result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both.
+// result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both. Operators widen
+// scalars to all lanes. Arguments of functions need a cast.
 //
 // The host defines these macros before the text (prelude_of in host/render/pass.c):
 //     LANES            1, 4, 8 or 16
+//     IS_OUT_OF_LINE   1 if the compiler cannot build kernels with large functions inlined (OUT_OF_LINE)
 //     IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
 //     IS_CERTIFIED     1: every decision has a bound on its error (shapes/certain.h)
 //     IS_PIXEL_LIST    1: renders a list of pixels instead of a band (film.h)
