@@ -22,8 +22,8 @@
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_COUNT };
 
-// The largest errors in ulp, in addition to the device's rounding, by which roots exceed what the
-// specification permits.
+// The largest simulated errors in ulp. The device's own half ulp is added, so that roots and powers exceed
+// the specification's 3 and 16 ulp by as much.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16 };
 
 static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
@@ -34,8 +34,8 @@ static inline unsigned_integer perturb_hash(uint operation, integer a, integer b
     return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
 }
 
-// Moves the value by a hashed number of ulp, up to `largest`. Does not change 0 and values near underflow or
-// overflow.
+// Moves the value by a hashed number of ulp, up to `largest`. Leaves 0 and values near underflow or overflow
+// unchanged.
 static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
     largest *= PERTURB_SCALE;
@@ -63,7 +63,8 @@ static inline real device_sqrt(real a)
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
-// Divides numbers that are the same for all lanes.
+// Divides numbers that are the same in all lanes. At `strict` the quotient is not repaired, so it may only
+// enter bounds.
 static inline scalar uniform_divide(scalar a, scalar b)
 {
     if (!PERTURB) return a / b;

@@ -4,7 +4,7 @@
 
 #include "shading/triangle_points.h"
 
-// Turns both normals to the side that the ray comes from.
+// Sets the surface's point and its errors, with both normals turned to the side that the ray comes from.
 static inline void surface_set_point(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
     if (IS_CERTIFIED) surface_set_errors(surface, point, ray);

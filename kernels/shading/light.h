@@ -54,7 +54,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
-// Returns the strength of a light at a vector's length, which is never 0.
+// Returns the factor, above 0, by which a light fades over the length of `to_light`.
 static inline real light_fading(const Light *light, Vector to_light)
 {
     real light_distance = real_sqrt(vector_dot(to_light, to_light));

@@ -9,7 +9,7 @@ typedef struct {
     scalar size, longest;
 } TriangleSizes;
 
-// Returns an upper bound on the length of xyz >= 0. A root would make packets wait.
+// Returns an upper bound on the length of xyz >= 0. Avoids a root, whose latency no other work hides.
 static inline scalar norm_above(scalar4 a)
 {
     scalar xy = a.x > a.y ? a.x : a.y, largest = xy > a.z ? xy : a.z;

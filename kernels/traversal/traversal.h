@@ -27,7 +27,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     }
     if (!lanes_any(ray->active)) return false;
     intersect_all_planes(traversal, scene, ray);
-    // without cull spheres, or if the BVH's is not the only one
+    // skipped if the BVH's cull sphere is the only one, since nothing but planes is outside the BVH
     if (near != 0 && scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray, near);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
