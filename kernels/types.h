@@ -29,15 +29,14 @@ typedef struct {
     uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES | HAS_POWER
 } Sphere;
 
-// Set in a shape's id.y if the eye's power defines the shape. For a sphere the power is
-// |center|^2 - radius^2 before either is rounded, and it replaces the radius. Next to a planet, center and
-// radius round to half a meter, the power to an ulp of the distance. id.z has its bits as a float, or id.z
-// and id.w have the low and high half of its bits as a double.
-enum { HAS_POWER = 16 };
-
-// Set in a shape's id.y if front faces are ignored, so that only rays from inside hit. It is never set
-// together with REVOLUTION_CAPPED.
-enum { IGNORES_FRONT_FACES = 8 };
+// Bits of a shape's id.y. If front faces are ignored, only rays from inside hit. Capped shapes never ignore
+// them.
+//
+// HAS_POWER is set if the eye's power defines the shape. For a sphere the power is |center|^2 - radius^2
+// before either is rounded, and it replaces the radius. Next to a planet, center and radius round to half a
+// meter, the power to an ulp of the distance. id.z has its bits as a float, or id.z and id.w have the low and
+// high half of its bits as a double.
+enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2, IGNORES_FRONT_FACES = 4, HAS_POWER = 8 };
 
 typedef struct {
     scalar4 point;
@@ -74,8 +73,6 @@ typedef struct {
     scalar4 range;       // if finite, p . axis runs from w (0 without a power) to x; y: |axis|; z: |axis|^2
     uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES | HAS_POWER
 } Revolution;
-
-enum { REVOLUTION_FINITE = 1, REVOLUTION_CAPPED = 2 };
 
 typedef Revolution Cylinder;
 typedef Revolution Cone;
@@ -139,12 +136,14 @@ typedef struct {
 // A sphere, disc, cylinder, cone, torus or paraboloid under an affine map, such as an ellipsoid. The map
 // leads from the space of a unit shape, centered at 0 on the z axis, to that of the eye.
 typedef struct {
-    scalar4 rows[3];     // rows of the map; w: the image of the unit shape's 0
-    scalar4 inverses[3]; // rows of its inverse; w of the first: a bound on its norm; w of the second: below
-    scalar4 extent;      // half of its box, 0 if unbounded; w: its condition (INSTANCE_CONDITION_MAX)
+    scalar4 rows[3]; // rows of the map; w: the image of the unit shape's 0
+    // Rows of its inverse. w of the first: a bound on its norm; w of the second: the shape's reach, half the
+    // diagonal of its box, or its unit if unbounded. Rays that start farther than twice the reach from the
+    // image of 0 are moved before they are mapped.
+    scalar4 inverses[3];
+    scalar4 extent; // half of its box, 0 if unbounded; w: its condition (INSTANCE_CONDITION_MAX)
     // Parameters of the unit shape. x: the radius, a power of two; w: half the height if finite; y, z: a
-    // cone's radius at the base and slope, a torus' radii, or a paraboloid's k. Rays that start farther from
-    // 0 than twice inverses[1].w are moved before they are mapped.
+    // cone's radius at the base and slope, a torus' radii, or a paraboloid's k.
     scalar4 sizes;
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED, z: the unit shape's TYPE_…
 } Oval;
