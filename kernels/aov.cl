@@ -30,10 +30,10 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     Surface surface = visible_surface(scene, &ray, &hit);
     const mask found = hit_found(&hit);
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
-    film_store_color(layers->ray, tile, ray.direction);
+    film_store_vector(layers->ray, tile, ray.direction);
     film_store(layers->t, tile, 1, 0, hit_distance(&hit));
-    film_store_color(layers->normal, tile, vector_select(found, surface.shading_normal, zero));
-    film_store_color(layers->position, tile, vector_select(found, surface.position, zero));
+    film_store_vector(layers->normal, tile, vector_select(found, surface.shading_normal, zero));
+    film_store_vector(layers->position, tile, vector_select(found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
     mask uncertain = mask_none();
     if (IS_CERTIFIED) uncertain = hit.uncertain | (found & surface.uncertain);

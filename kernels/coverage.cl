@@ -23,7 +23,7 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
         compensated_add(&light, &lost, vector_select(found, black, seen));
     }
     film_store(coverage, tile, 1, 0, real_divide(covered, divisor));
-    film_store_color(backdrop, tile, color_divide(light, divisor));
+    film_store_vector(backdrop, tile, color_divide(light, divisor));
 }
 
 kernel void coverage(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,

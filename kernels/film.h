@@ -36,8 +36,8 @@ static inline uint bits_scramble(uint bits)
 }
 
 // Returns one pixel of each square of cell x cell pixels with the given corner. A hash chooses it, which
-// gives a stratified sample of the image (host/measure/pilot.h). `down` is hashed from all 32 bits, since
-// `across` reveals the first few.
+// gives a stratified sample of the image (host/measure/pilot.h). `down` is hashed from all 32 bits, because
+// `across` has consumed the leading ones.
 static inline Pixels pixels_scatter(Pixels corner, uint cell)
 {
     IntegerLanes x = {corner.x}, y = {corner.y};
@@ -55,7 +55,7 @@ static inline Pixels pixels_scatter(Pixels corner, uint cell)
 static inline Tile list_tile(const Band *band, uint which)
 {
     uint first = ((uint)get_global_id(0) * TILES + which) * LANES;
-    if (get_global_id(1) > 0) first = band->width;
+    if (get_global_id(1) > 0) first = band->width; // a list is one row, beyond which work-items are idle
     IntegerLanes index, x, y, inside, slot;
     for (uint lane = 0; lane < LANES; lane++) {
         uint at = min(first + lane, band->width - 1);
@@ -65,7 +65,11 @@ static inline Tile list_tile(const Band *band, uint which)
         y.each[lane] = band->list[LIST_WORDS * at + 1];
         slot.each[lane] = band->list[LIST_WORDS * at + 3];
     }
-    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, slot.all, 0, band->width, 0};
+    Tile tile = {.pixels = {x.all, y.all},
+                 .inside = inside.all != (integer)(0),
+                 .index = index.all,
+                 .slot = slot.all,
+                 .width = band->width};
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -143,12 +147,12 @@ static inline void color_interleave(Vector color, real *parts)
 }
 #endif
 
-static inline void film_store_color(global scalar *film, const Tile *tile, Vector color)
+static inline void film_store_vector(global scalar *film, const Tile *tile, Vector vector)
 {
 #ifdef SHUFFLE_ROWS
     if (tile->whole) {
         real parts[3];
-        color_interleave(color, parts);
+        color_interleave(vector, parts);
         global scalar *row = film + (size_t)tile->first * 3;
 #pragma unroll
         for (uint lane = 0; lane < LANES; lane += 4, row += (size_t)tile->width * 3)
@@ -158,9 +162,9 @@ static inline void film_store_color(global scalar *film, const Tile *tile, Vecto
         return;
     }
 #endif
-    film_store(film, tile, 3, 0, color.x);
-    film_store(film, tile, 3, 1, color.y);
-    film_store(film, tile, 3, 2, color.z);
+    film_store(film, tile, 3, 0, vector.x);
+    film_store(film, tile, 3, 1, vector.y);
+    film_store(film, tile, 3, 2, vector.z);
 }
 
 #if LANES == 16 && defined(SHUFFLE_ROWS)
@@ -202,7 +206,7 @@ static inline void film_store_tiles(global scalar *film, const Tile *tiles, cons
         film_store_four(film, &tiles[i], &colors[i]);
 #endif
     for (; i < PACKETS; i++)
-        film_store_color(film, &tiles[i], colors[i]);
+        film_store_vector(film, &tiles[i], colors[i]);
 }
 
 // Stores the colors of a list's pixels in the film of their band.

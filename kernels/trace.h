@@ -64,7 +64,7 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
         IS_CERTIFIED ? lanes_select(hit.uncertain, (real)(1), (real)(0)) : (real)(0);
 #if TRACES_BOUNCES
     Bounces bounces = bounces_none(&ray, 1);
-    surface_bounce(&surface, vector_normalize(direction), color_gray((real)(1)), true, &bounces);
+    surface_set_bounces(&surface, vector_normalize(direction), color_gray((real)(1)), true, &bounces);
     const Bounce reflected = bounces.reflected, refracted = bounces.refracted;
     vector_store(reflected.origin, result + RESULT_REFLECTED_ORIGIN);
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);

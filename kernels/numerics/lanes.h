@@ -340,10 +340,10 @@ static inline real lanes_smallest_of_each(const real *vectors)
 
 // Replaces eight vectors by their smallest lanes. Comparing lanes in pairs packs two vectors into one, so
 // that all eight take little longer than one. It is unrolled, so that they stay in registers.
-static inline void lane_minima_reduce(LaneMinima *leasts)
+static inline void lane_minima_reduce(LaneMinima *minima)
 {
 #if LANES > 1
-    real *all = leasts->all;
+    real *all = minima->all;
     real first = real_min_of_pairs(all[0], all[1]), second = real_min_of_pairs(all[2], all[3]);
     real third = real_min_of_pairs(all[4], all[5]), fourth = real_min_of_pairs(all[6], all[7]);
     all[0] = real_min_of_pairs(first, second);

@@ -158,8 +158,8 @@ static inline Color3 reflected_weight(const Surface *surface, Vector direction, 
 // Sets the reflected and the refracted ray of a surface, for a unit `direction` and the weight of the ray
 // that hits it. By Fresnel's equations and in total internal reflection, the reflected ray keeps a part of
 // the transmission, which is not tinted. Unless `all`, a ray that no lane carries is not set.
-static inline void surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
-                                  Bounces *bounces)
+static inline void surface_set_bounces(const Surface *surface, Vector direction, Color3 weight, bool all,
+                                       Bounces *bounces)
 {
     Bounce *reflected = &bounces->reflected, *refracted = &bounces->refracted;
     real reflection = HAS_REFLECTION ? surface->reflection : (real)(0), kept = (real)(0);

@@ -62,7 +62,7 @@ typedef struct {
     real facing;        // bounds the error of its cosine with the shading normal
     real strength;      // bounds the error of its strength, relative to full
     real brightest;     // the largest channel of its color that arrives
-    mask far_off;       // too near or too far away to bound whether it is occluded
+    mask out_of_range;  // too near or too far away to bound whether it is occluded
     mask skips_culling; // the errors are too large for cull spheres
 } LightErrors;
 
@@ -99,7 +99,7 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
         nearest = real_max(nearest, inverse);
     }
     real relative = lanes_select(in_range, errors->place * nearest, NEVER);
-    errors->far_off = !(relative <= SHADOW_UNCERTAIN_MAX);
+    errors->out_of_range = !(relative <= SHADOW_UNCERTAIN_MAX);
     errors->skips_culling =
         (relative > SHADOW_ERROR_MAX * UNIT_ROUNDOFF) | (squared * squared < CULLED_DISTANCE_MIN);
     errors->angle = errors->angle + relative + relative;
@@ -196,7 +196,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT)
         light_add_spot_errors(light, surface, to_light, turned, &errors, visibility);
     visibility->color_error = lanes_select(turned, (real)(0), light_color_error(surface, to_light, &errors));
-    visibility->uncertain = visibility->uncertain | (visibility->lit & errors.far_off);
+    visibility->uncertain = visibility->uncertain | (visibility->lit & errors.out_of_range);
     shadow_ray->active = shadow_ray->active & !visibility->uncertain;
     return errors.skips_culling;
 }

@@ -62,7 +62,7 @@ static inline global uint *node_record(const TreeNode *node)
 
 // Sets the numbers of the bounces and, in a replay, the lanes in which they are recorded. Trees are numbered
 // breadth first. The bound keeps the numbers of deep bounces, which have no record, from wrapping.
-static inline void node_set_children(const TreeNode *node, Bounces *bounces)
+static inline void bounces_set_nodes(Bounces *bounces, const TreeNode *node)
 {
     const uint parent = min(node->number, (uint)RECORDED_NODES);
     bounces->reflected.number = HAS_TRANSMISSION ? 2 * parent + 1 : parent + 1;
@@ -78,7 +78,7 @@ static inline void node_set_bounce(TreeNode *node, const Bounce *bounce)
     node->known = bounce->known;
 }
 
-// Records the hit of a packet's rays. `uncertain` marks the lanes where it is not proven.
+// Sets the hit of a packet's rays. `uncertain` marks the lanes where it is not proven.
 static inline void node_set_hit(TreeNode *node, const Ray *ray, integer object, mask uncertain)
 {
     node->known = ray->active & !uncertain;
@@ -86,7 +86,7 @@ static inline void node_set_hit(TreeNode *node, const Ray *ray, integer object, 
     node->events = (integer)(0);
 }
 
-// Records the lanes that see a light or that opaque objects hide from it.
+// Sets the lanes that see a light or that opaque objects hide from it.
 static inline void node_set_light(TreeNode *node, uint light, const Ray *shadow_ray,
                                   const Traversal *occlusion)
 {

@@ -136,10 +136,10 @@ static inline mask color_is_uncertain(Color3 color, real error)
 
 // Sets the bounces of a ray at its hit. `traced` is the bounce that the ray was made from. Adds the lanes
 // where they are uncertain to *uncertain.
-static inline void hit_bounce(const Scene *scene, const Ray *ray, const Surface *surface,
-                              const Bounce *traced, Bounces *bounces, mask *uncertain)
+static inline void hit_set_bounces(const Scene *scene, const Ray *ray, const Surface *surface,
+                                   const Bounce *traced, Bounces *bounces, mask *uncertain)
 {
-    surface_bounce(surface, vector_renormalize(ray->direction), traced->weight, false, bounces);
+    surface_set_bounces(surface, vector_renormalize(ray->direction), traced->weight, false, bounces);
     if (scene->header->sample.w > 0) {
         const real least = (real)(scene->header->sample.w);
         bounces->reflected.weight = weight_cut(bounces->reflected.weight, least, uncertain);
@@ -194,9 +194,9 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
                                    lanes_select(active, shaded->color_error, (real)(0)), color_error);
 
         if (lanes_any(found) && traced.depth < scene->header->bounces.x)
-            hit_bounce(scene, rays, &shaded->surface, &traced, &bounces, uncertain);
+            hit_set_bounces(scene, rays, &shaded->surface, &traced, &bounces, uncertain);
         if (COMPUTE_SIGNATURE) *path = path_signature_add(*path, rays, shaded->surface.object, &bounces);
-        if (HAS_DECISIONS) node_set_children(node, &bounces);
+        if (HAS_DECISIONS) bounces_set_nodes(&bounces, node);
         if (RECORDS_DECISIONS) node_store(node, &bounces);
         const mask reflects = bounce_is_active(&bounces.reflected),
                    refracts = bounce_is_active(&bounces.refracted);
