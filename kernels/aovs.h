@@ -1,5 +1,5 @@
 // Lists the layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), most of
-// which describe the ray through its center. The layers' numbers and names, their places on the device and
+// which describe the ray through its center. The layers' numbers and names, their offsets on the device and
 // the files follow from these lists. Adding an AOV also takes its computation in a kernel and its
 // documentation.
 //

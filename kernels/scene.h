@@ -42,7 +42,7 @@ static inline ObjectRange outside_instances(void)
 static inline ObjectRange instance_range(const Scene *scene, uint first, uint end, uint index)
 {
     const uint4 instance = scene->instances[index].id;
-    return (ObjectRange){first, end, scene->shared_meshes[instance.y].place.y, true, index, instance.z};
+    return (ObjectRange){first, end, scene->shared_meshes[instance.y].root_entry.y, true, index, instance.z};
 }
 
 // Returns the range that an id is in.

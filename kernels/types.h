@@ -240,14 +240,14 @@ enum { SPHERE_ROWS = 4 };
 #ifdef __OPENCL_VERSION__
 typedef struct {
     scalar4 rows[SPHERE_ROWS * BVH_QUARTER];
-    uint4 ids[BVH_QUARTER], places[BVH_QUARTER];
+    uint4 ids[BVH_QUARTER], indices[BVH_QUARTER];
 } SphereBlock;
 #endif
 
 // The indices of the first triangles of four blocks.
 typedef struct {
     uint4 triangles;
-} BlockPlaces;
+} BlockTriangles;
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, such as the
 // eye or a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x spheres: one for
@@ -273,8 +273,8 @@ enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
 
 // A mesh that instances share. Its triangles, whose id.x counts from 0, follow those of the scene.
 typedef struct {
-    scalar4 extent; // half of its box
-    uint4 place;    // x: its BVH's root, y: the ObjectEntry of its first triangle
+    scalar4 extent;   // half of its box
+    uint4 root_entry; // x: its BVH's root, y: the ObjectEntry of its first triangle
 } SharedMesh;
 
 // The ids of an instance. The array has an element for each instance, in the order of ids. The ids between
@@ -324,7 +324,7 @@ enum { WRAP_REPEATED, WRAP_CLAMPED, WRAP_MIRRORED };
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.
 typedef struct {
-    uint4 place; // x: index of its first texel, top left; y: width, z: height
+    uint4 range; // x: index of its first texel, top left; y: width, z: height
 } TextureLevel;
 
 typedef struct {
@@ -398,7 +398,7 @@ enum {
 // One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's image.
 typedef struct {
     // x: least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
-    scalar4 place;
+    scalar4 range;
 } SkyCell;
 
 enum { SKY_ROWS = 128, SKY_COLUMNS = 128 };
@@ -470,7 +470,7 @@ typedef struct {
     ARRAY(TRIANGLE_UVS, TriangleUvs, , triangle_uvs)                   \
     ARRAY(TRIANGLE_NEIGHBORS, TriangleNeighbors, , triangle_neighbors) \
     ARRAY(TRIANGLE_BLOCKS, TriangleBlock, , triangle_blocks)           \
-    ARRAY(BLOCK_PLACES, BlockPlaces, , block_places)                   \
+    ARRAY(BLOCK_TRIANGLES, BlockTriangles, , block_triangles)          \
     ARRAY(SPHERE_BLOCKS, SphereBlock, , sphere_blocks)                 \
     ARRAY(CULL_SPHERES, CullSphere, , cull_spheres)                    \
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \

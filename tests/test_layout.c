@@ -17,7 +17,7 @@ typedef struct {
 
 typedef struct {
     scalar4 rows[SPHERE_ROWS];
-    uint4 ids[1], places[1];
+    uint4 ids[1], indices[1];
 } HostSphereBlock;
 
 // Every member of every struct: its type in the flat arrays, the kernels' name of the struct, the host's, the
@@ -72,8 +72,8 @@ typedef struct {
     REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[0])             \
     REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[SPHERE_ROWS - 1]) \
     INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, ids[0])           \
-    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, places[0])        \
-    INTEGERS(FLAT_BLOCK_PLACES, BlockPlaces, BlockPlaces, triangles)             \
+    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, indices[0])       \
+    INTEGERS(FLAT_BLOCK_TRIANGLES, BlockTriangles, BlockTriangles, triangles)    \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, type_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
@@ -104,11 +104,11 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, across_u)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
     INTEGERS(FLAT_LIGHTS, Light, FlatLight, type)                                \
-    REALS(FLAT_SKY_CELLS, SkyCell, FlatSkyCell, place)                           \
-    INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
+    REALS(FLAT_SKY_CELLS, SkyCell, FlatSkyCell, range)                           \
+    INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, range)             \
     INTEGERS(FLAT_TEXELS, Texel, Texel, color)                                   \
     REALS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, extent)                    \
-    INTEGERS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, place)                  \
+    INTEGERS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, root_entry)             \
     INTEGERS(FLAT_INSTANCE_IDS, InstanceIds, InstanceIds, ids)
 // clang-format on
 

@@ -88,7 +88,7 @@ static Node node_at(const CompiledScene *compiled, size_t index)
 static size_t check_block(const CompiledScene *compiled, size_t index, size_t count)
 {
     const size_t width = single.lanes;
-    const size_t first = ((const uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items)[index];
+    const size_t first = ((const uint32_t *)compiled->arrays[FLAT_BLOCK_TRIANGLES].items)[index];
     const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS];
     const bool is_double = blocks->layout.scalar4_count > 0;
     const void *rows = flat_array_at(blocks, index);

@@ -7,7 +7,7 @@
 // One block of FLAT_SPHERE_BLOCKS.
 typedef struct {
     double *rows;
-    uint32_t *ids, *places;
+    uint32_t *ids, *indices;
     size_t width;
 } FlatSphereBlock;
 
@@ -30,8 +30,8 @@ static bool is_block(uint32_t child_type)
 // Returns the index of a block's first primitive, to be read or set.
 static uint32_t *block_place(const CompiledScene *compiled, unsigned type, size_t block)
 {
-    if (type == TYPE_SPHERES) return sphere_block_at(compiled, block).places;
-    return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
+    if (type == TYPE_SPHERES) return sphere_block_at(compiled, block).indices;
+    return (uint32_t *)compiled->arrays[FLAT_BLOCK_TRIANGLES].items + block;
 }
 
 void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
@@ -45,7 +45,7 @@ void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
         }
     flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, counts[TYPE_TRIANGLES], width, !is_double);
     flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, counts[TYPE_SPHERES], width, false);
-    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (counts[TYPE_TRIANGLES] + 3) / 4);
+    flat_array_renew(compiled, FLAT_BLOCK_TRIANGLES, (counts[TYPE_TRIANGLES] + 3) / 4);
     uint32_t next[TYPE_COUNT] = {0};
     for (size_t i = 0; i < nodes->count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
@@ -96,9 +96,9 @@ static void sphere_block_fill(const CompiledScene *compiled, size_t index, unsig
 {
     const FlatSphereBlock block = sphere_block_at(compiled, index);
     for (unsigned lane = 0; lane < block.width; lane++) {
-        block.places[lane] = block.places[0] + (lane < count ? lane : 0);
+        block.indices[lane] = block.indices[0] + (lane < count ? lane : 0);
         const Sphere *sphere =
-            flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], block.places[lane]);
+            flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], block.indices[lane]);
         block.rows[lane] = sphere->center_radius.x;
         block.rows[block.width + lane] = sphere->center_radius.y;
         block.rows[2 * block.width + lane] = sphere->center_radius.z;

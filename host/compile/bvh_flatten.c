@@ -204,7 +204,7 @@ static void tree_arrays_renew(CompiledScene *compiled)
     flat_array_renew(compiled, FLAT_NODES, 1); // empty, since a kernel may visit it
     flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
     flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, 0, BVH_WIDTH_MIN, false);
-    flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
+    flat_array_renew(compiled, FLAT_BLOCK_TRIANGLES, 0);
 }
 
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)

@@ -25,7 +25,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_BLOCKS] = {BVH_WIDTH_MAX / 4 * BLOCK_ROWS * sizeof(scalar4), BVH_WIDTH_MAX / 4 * BLOCK_ROWS, 0},
     [FLAT_SPHERE_BLOCKS] = {BVH_WIDTH_MAX / 4 * (SPHERE_ROWS * sizeof(scalar4) + 2 * sizeof(uint4)),
                             BVH_WIDTH_MAX / 4 * SPHERE_ROWS, BVH_WIDTH_MAX / 4 * 2},
-    [FLAT_BLOCK_PLACES] = LAYOUT(BlockPlaces, triangles, triangles),
+    [FLAT_BLOCK_TRIANGLES] = LAYOUT(BlockTriangles, triangles, triangles),
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
@@ -33,8 +33,8 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, normal_map),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, type, type),
     [FLAT_SKY_CELLS] = LAYOUT_OF_REALS(FlatSkyCell),
-    [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
-    [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, place, place),
+    [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, range, range),
+    [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, root_entry, root_entry),
     [FLAT_INSTANCE_IDS] = LAYOUT(InstanceIds, ids, ids),
     [FLAT_TEXELS] = LAYOUT(Texel, color, color),
 };
@@ -84,7 +84,7 @@ bool is_ordered_by_bvh(size_t type)
 {
     return (type >= FLAT_FIRST_SHAPE && type < FLAT_FIRST_SHAPE + TYPE_COUNT) || type == FLAT_OBJECTS ||
            type == FLAT_NODES || type == FLAT_TRIANGLE_BLOCKS || type == FLAT_SPHERE_BLOCKS ||
-           type == FLAT_BLOCK_PLACES || type == FLAT_SHARED_MESHES || type == FLAT_INSTANCE_IDS;
+           type == FLAT_BLOCK_TRIANGLES || type == FLAT_SHARED_MESHES || type == FLAT_INSTANCE_IDS;
 }
 
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)

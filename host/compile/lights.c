@@ -53,7 +53,7 @@ void sky_cells_flatten(CompiledScene *compiled, const Scene *scene)
     FlatSkyCell *cells = compiled->arrays[FLAT_SKY_CELLS].items;
     for (size_t i = 0; i < compiled->arrays[FLAT_SKY_CELLS].count; i++) {
         const SkyCell *cell = &scene->sky.cells[i];
-        cells[i].place = (scalar4){cell->longitude_begin, cell->longitude_end - cell->longitude_begin,
+        cells[i].range = (scalar4){cell->longitude_begin, cell->longitude_end - cell->longitude_begin,
                                    cell->sine_begin, cell->sine_end - cell->sine_begin};
     }
 }

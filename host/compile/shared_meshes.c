@@ -78,21 +78,21 @@ static void shared_mesh_shift(const CompiledScene *compiled, CompiledScene *part
     }
     const uint32_t block_count = (uint32_t)part->arrays[FLAT_TRIANGLE_BLOCKS].count;
     bvh_shift(part, bases[FLAT_NODES], block_count > 0 ? bases[FLAT_TRIANGLE_BLOCKS] : triangle_base);
-    uint32_t *places = part->arrays[FLAT_BLOCK_PLACES].items;
+    uint32_t *firsts = part->arrays[FLAT_BLOCK_TRIANGLES].items;
     for (uint32_t i = 0; i < block_count; i++)
-        places[i] += triangle_base;
+        firsts[i] += triangle_base;
 }
 
-static void block_places_append(CompiledScene *compiled, const CompiledScene *part)
+static void block_triangles_append(CompiledScene *compiled, const CompiledScene *part)
 {
     const size_t before = compiled->arrays[FLAT_TRIANGLE_BLOCKS].count,
                  added = part->arrays[FLAT_TRIANGLE_BLOCKS].count;
-    FlatArray *places = &compiled->arrays[FLAT_BLOCK_PLACES];
-    places->count = (before + added + 3) / 4;
+    FlatArray *firsts = &compiled->arrays[FLAT_BLOCK_TRIANGLES];
+    firsts->count = (before + added + 3) / 4;
     if (added > 0)
-        memcpy((uint32_t *)places->items + before, part->arrays[FLAT_BLOCK_PLACES].items,
+        memcpy((uint32_t *)firsts->items + before, part->arrays[FLAT_BLOCK_TRIANGLES].items,
                added * sizeof(uint32_t));
-    compiled->changed[FLAT_BLOCK_PLACES] = true;
+    compiled->changed[FLAT_BLOCK_TRIANGLES] = true;
 }
 
 // Makes arrays ready for appending: blocks and nodes are as wide as the kernel's.
@@ -112,8 +112,8 @@ static void arrays_prepare(CompiledScene *compiled, const CompiledScene *parts, 
         array_extend(compiled, extended[i], count);
         if (extended[i] == FLAT_TRIANGLE_BLOCKS) block_count += count;
     }
-    FlatArray *places = &compiled->arrays[FLAT_BLOCK_PLACES];
-    array_extend(compiled, FLAT_BLOCK_PLACES, (block_count + 3) / 4 - places->count);
+    FlatArray *firsts = &compiled->arrays[FLAT_BLOCK_TRIANGLES];
+    array_extend(compiled, FLAT_BLOCK_TRIANGLES, (block_count + 3) / 4 - firsts->count);
 }
 
 void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
@@ -131,7 +131,7 @@ void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const Com
                        entry = (uint32_t)compiled->arrays[FLAT_OBJECTS].count;
         meshes[i] = (SharedMesh){scalar4_of(plan->meshes[i].extent, 0), {root, entry, 0, 0}};
         shared_mesh_shift(compiled, &parts[i]);
-        block_places_append(compiled, &parts[i]);
+        block_triangles_append(compiled, &parts[i]);
         for (size_t k = 0; k < EXTENDED_COUNT; k++)
             array_append(compiled, extended[k], &parts[i].arrays[extended[k]]);
         if (parts[i].pending_children_max > compiled->pending_children_max)

@@ -129,14 +129,14 @@ static void texels_flatten(CompiledScene *compiled, const Scene *scene)
         CompiledTexture *texture = &compiled->textures[i];
         const TextureLevel *level = &levels[texture->first_level];
         const Image *image = &scene->textures.items[i].image;
-        Texel *fine = texels + level->place.x;
+        Texel *fine = texels + level->range.x;
         level_fill(fine, image,
                    image->display && scene->textures.items[i].content < TEXTURE_NORMALS &&
                        scene->color_meaning != COLORS_DISPLAY);
         texture->largest_texel = largest_texel(fine, (size_t)image->width * image->height);
         for (uint32_t k = 1; k < texture->level_count; k++)
-            level_halve(texels + level[k].place.x, texels + level[k - 1].place.x, level[k - 1].place.y,
-                        level[k - 1].place.z);
+            level_halve(texels + level[k].range.x, texels + level[k - 1].range.x, level[k - 1].range.y,
+                        level[k - 1].range.z);
     }
 }
 

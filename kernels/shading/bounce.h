@@ -24,7 +24,7 @@ typedef struct {
     real origin_error, start_error, direction_error;
     integer origin_object;
     mask leaves_outward;
-    real chord_turn, chord_end_place;
+    real chord_turn, chord_end_position;
     // with HAS_DECISIONS, the ray's number in its tree and the lanes in which its node is recorded
     uint number;
     mask known;
@@ -48,7 +48,7 @@ static inline Ray bounce_ray(const Bounce *bounce)
         ray.leaves_outward = bounce->leaves_outward;
         if (HAS_CHORDS) {
             ray.chord_turn = bounce->chord_turn;
-            ray.chord_end_place = bounce->chord_end_place;
+            ray.chord_end_position = bounce->chord_end_position;
         }
     }
     return ray;

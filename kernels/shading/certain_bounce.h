@@ -17,7 +17,7 @@
 static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask inside)
 {
     bounce->chord_turn = lanes_select(inside, chord->turn, NEVER);
-    bounce->chord_end_place = lanes_select(inside, chord->end_place, NEVER);
+    bounce->chord_end_position = lanes_select(inside, chord->end_position, NEVER);
     real error = real_min(bounce->direction_error, chord->direction_error);
     real_replace(&bounce->direction_error, inside, error);
 }
@@ -47,7 +47,7 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
     reflected->direction_error = error;
     if (HAS_CHORDS) {
         const ChordEnd *end = &surface->chord_end;
-        Chord chord = chord_start(end, surface->place_error, incidence->cosine,
+        Chord chord = chord_start(end, surface->position_error, incidence->cosine,
                                   real_fma((real)(3), end->normal, BOUNCE_ROUNDING),
                                   incidence->angle_error + end->normal + BOUNCE_ROUNDING);
         bounce_set_chord(reflected, &chord, !surface->entering);
@@ -97,13 +97,13 @@ static inline void refracted_set_chord(const Surface *surface, const Snell *snel
 {
     const ChordEnd *end = &surface->chord_end;
     real inverse_ior = real_divide((real)(1), surface->ior);
-    Chord chord = chord_start(end, surface->place_error, snell->root * inverse_ior, NEVER,
+    Chord chord = chord_start(end, surface->position_error, snell->root * inverse_ior, NEVER,
                               real_fma(angle_error, inverse_ior, computed + end->normal));
     bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= 1));
     // the steepness in the plane of incidence; across it this is n, which is more where n < 1
     real steepest = real_max(real_divide(snell->s + snell->s_error, snell->least_root), snell->scale);
     real turned = real_fma(steepest, end->turn + end->normal, end->normal);
-    real leaving = computed + (divide_or(end->place, end->radius, NEVER) + turned);
+    real leaving = computed + (divide_or(end->position, end->radius, NEVER) + turned);
     refracted->direction_error = lanes_select(surface->entering, refracted->direction_error,
                                               real_min(leaving, refracted->direction_error));
 }
@@ -147,7 +147,7 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, Bo
     const Incidence incidence = surface_incidence(surface, ray);
     reflected->origin_error = surface->line_error;
     reflected->start_error = surface->start_error;
-    refracted->origin_error = surface->place_error;
+    refracted->origin_error = surface->position_error;
     refracted->start_error = (real)(0);
     reflected->origin_object = refracted->origin_object = surface->object;
     reflected->leaves_outward = surface->entering;

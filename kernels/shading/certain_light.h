@@ -57,7 +57,7 @@ static inline real highlight_error(const Surface *surface, const LightRay *light
 
 // Bounds on a light and on the errors of the way to it, before the shadow ray is traced.
 typedef struct {
-    real place;         // bounds the errors of the shadow ray's ends
+    real position;      // bounds the errors of the shadow ray's ends
     real angle;         // bounds the error of the light's direction
     real facing;        // bounds the error of its cosine with the shading normal
     real strength;      // bounds the error of its strength, relative to full
@@ -84,7 +84,7 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
 {
     Ray *shadow_ray = &to_light->shadow_ray;
     shadow_ray->ends_at_light = true;
-    errors->place = errors->place + 2 * UNIT_ROUNDOFF * vector_norm1(vector_of(light->position));
+    errors->position = errors->position + 2 * UNIT_ROUNDOFF * vector_norm1(vector_of(light->position));
     // avoids another root; the unit vector is off by 14.5 u, the dot product by 3 u
     if (!HAS_SMOOTH_NORMALS)
         shadow_ray->length =
@@ -98,7 +98,7 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
         real inverse = divide_or((real)(1 + 32 * UNIT_ROUNDOFF), vector_norm(to_position), NEVER);
         nearest = real_max(nearest, inverse);
     }
-    real relative = lanes_select(in_range, errors->place * nearest, NEVER);
+    real relative = lanes_select(in_range, errors->position * nearest, NEVER);
     errors->out_of_range = !(relative <= SHADOW_UNCERTAIN_MAX);
     errors->skips_culling =
         (relative > SHADOW_ERROR_MAX * UNIT_ROUNDOFF) | (squared * squared < CULLED_DISTANCE_MIN);
@@ -184,13 +184,14 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
                                     LightVisibility *visibility)
 {
     Ray *shadow_ray = &to_light->shadow_ray;
-    LightErrors errors = {
-        .place = surface->place_error, .angle = DIRECTION_ROUNDING, .brightest = (real)(light->color.w)};
-    if (HAS_SMOOTH_NORMALS) errors.place = errors.place + surface->lift_error;
+    LightErrors errors = {.position = surface->position_error,
+                          .angle = DIRECTION_ROUNDING,
+                          .brightest = (real)(light->color.w)};
+    if (HAS_SMOOTH_NORMALS) errors.position = errors.position + surface->lift_error;
     if (!light_is_directional(light)) light_add_distance_errors(light, surface, to_light, &errors);
     errors.facing = surface->normal_error + errors.angle;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
-    shadow_ray->origin_error = errors.place;
+    shadow_ray->origin_error = errors.position;
     shadow_ray->origin_object = surface->object;
     const mask turned = light_set_facing(surface, to_light, &errors, visibility);
     if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT)

@@ -15,7 +15,7 @@ static inline real least_cosine(Vector normal, const Ray *ray)
 // Exceeds 1 + 3/2 g for the largest error g of a ray's direction, BOUNCE_ERROR_MAX. The exact ray may be
 // turned by g, so that the errors along and across it are not quite at right angles, and the error across
 // grows by g times the one along.
-#define PLACE_SLACK ((real)(1.04f))
+#define POSITION_SLACK ((real)(1.04f))
 // Exceeds the roundings of a position that is narrowed, whose cosine of incidence is at least
 // NARROWED_COSINE_MIN.
 #define NARROWED_SLACK      ((real)(1.01f))
@@ -23,14 +23,14 @@ static inline real least_cosine(Vector normal, const Ray *ray)
 
 // Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
 // line_error off, crosses a plane that the position is `height` above; `cosine` is its least_cosine.
-static inline void surface_narrow_place(Surface *surface, mask lanes, real height, real cosine)
+static inline void surface_narrow_position(Surface *surface, mask lanes, real height, real cosine)
 {
     const real one = (real)(1), across = surface->line_error;
     lanes = lanes & (cosine > NARROWED_COSINE_MIN);
     const real sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + 16 * UNIT_ROUNDOFF);
     const real along = real_divide(real_fma(across, sine, height), lanes_select(lanes, cosine, one));
     const real both = hypotenuse_above(across, along);
-    real_replace(&surface->place_error, lanes, real_min(surface->place_error, NARROWED_SLACK * both));
+    real_replace(&surface->position_error, lanes, real_min(surface->position_error, NARROWED_SLACK * both));
 }
 
 // Sets the bounds that follow from the ray and its t. The position may be off across the ray by the ray's
@@ -42,48 +42,49 @@ static inline void surface_start_errors(Surface *surface, const Ray *ray, const 
     if (HAS_CHORDS) surface->chord_end = chord_end_none();
     real length = ray->length * BOUND_SLACK, t = fabs(hit->t);
     real rounding = 2 * UNIT_ROUNDOFF * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
-    real across = ray_place_error(ray, length * t),
+    real across = ray_position_error(ray, length * t),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
-    surface->place_error = real_fma(PLACE_SLACK, hypotenuse_above(across, along), rounding);
+    surface->position_error = real_fma(POSITION_SLACK, hypotenuse_above(across, along), rounding);
     surface->line_error = across * BOUND_SLACK + rounding; // excludes the surface
     surface->start_error = along * BOUND_SLACK + rounding;
 }
 
 // Sets the error of a reflected ray's line. A flat mirror that is `height` off moves that line by twice the
-// height, and keeps its distance from the exact line. So errors of place add up from mirror to mirror,
+// height, and keeps its distance from the exact line. So errors of position add up from mirror to mirror,
 // whereas those of points grow by one over the cosine.
 static inline void surface_set_line_error(Surface *surface, const SurfacePoint *point)
 {
     real line_error = real_fma((real)(2), point->height, surface->line_error);
-    mask flat = line_error < surface->place_error;
-    surface->line_error = lanes_select(flat, line_error, surface->place_error);
+    mask flat = line_error < surface->position_error;
+    surface->line_error = lanes_select(flat, line_error, surface->position_error);
     surface->start_error = lanes_select(flat, surface->start_error, (real)(0));
 }
 
 // Sets the bounds of the lanes that hit one object, for their position and for their point's normal.
-static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints *found, const Scene *scene,
+static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints *points, const Scene *scene,
                                             const Ray *ray, const Hit *hit)
 {
-    SurfacePoint *point = &found->point;
-    // the exact hit lies as near to the ray's own point as place_error says
+    SurfacePoint *point = &points->point;
+    // the exact hit lies as near to the ray's own point as position_error says
     point->position = ray_point(ray, hit->t);
-    if (HAS_CHORDS && found->entry.x == TYPE_SPHERES) {
-        Sphere sphere = scene->spheres[found->entry.y];
-        const ChordEnd end = chord_end(&sphere, ray, hit, point->position, found->lanes);
-        real_replace(&surface->place_error, found->lanes, real_min(surface->place_error, end.place));
-        surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
+    if (HAS_CHORDS && points->entry.x == TYPE_SPHERES) {
+        Sphere sphere = scene->spheres[points->entry.y];
+        const ChordEnd end = chord_end(&sphere, ray, hit, point->position, points->lanes);
+        real_replace(&surface->position_error, points->lanes,
+                     real_min(surface->position_error, end.position));
+        surface->chord_end = chord_end_select(points->lanes, end, surface->chord_end);
     }
-    shape_set_errors(scene, found, ray, hit->t, surface->place_error);
-    if (!HAS_TRIANGLES || found->entry.x != TYPE_TRIANGLES)
-        surface_narrow_place(surface, found->lanes & (point->height < NEVER), point->height,
-                             least_cosine(point->normal, ray));
+    shape_set_errors(scene, points, ray, hit->t, surface->position_error);
+    if (!HAS_TRIANGLES || points->entry.x != TYPE_TRIANGLES)
+        surface_narrow_position(surface, points->lanes & (point->height < NEVER), point->height,
+                                least_cosine(point->normal, ray));
 }
 
 // Sets the bounds at a hit. Marks the lanes where the side that the ray comes from, or that of the shading
 // normal, is uncertain.
 static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
-    surface->normal_error = point_normal_error(point, surface->place_error);
+    surface->normal_error = point_normal_error(point, surface->position_error);
     real geometric_error = surface->normal_error;
     mask is_open = mask_none();
     if (HAS_TRIANGLES) { // triangles with smooth normals

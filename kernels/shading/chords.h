@@ -1,10 +1,10 @@
 // Bounds rays inside a sphere, at `certified`. A ray that is reflected there runs along chords of one great
-// circle, all with the same angle of incidence, so that errors grow by addition. Bounds of place and
+// circle, all with the same angle of incidence, so that errors grow by addition. Bounds of position and
 // direction alone, which are correlated, would multiply with every chord. docs/numerics.md has the
 // derivation.
 //
 // Rotate the computed path about the center so that it starts at the exact path's point. That moves no point
-// by more than `place`. The remainder is an angle of at most `turn` between the first chords. It moves the
+// by more than `position`. The remainder is an angle of at most `turn` between the first chords. It moves the
 // points at their ends by at most twice the radius times the angle.
 #ifndef CHORDS_H
 #define CHORDS_H
@@ -13,15 +13,15 @@
 
 // The bounds at a point of a sphere.
 typedef struct {
-    real radius;      // 0 if there is no sphere, or the ray is too near to its tangent
-    real off;         // divided by the cosine of incidence, the largest distance to the sphere along the ray
-    real normal;      // error of the normal, for the place where the computed ray hits the sphere
-    real place, turn; // bounds of the chord that ends there; NEVER if none does
+    real radius; // 0 if there is no sphere, or the ray is too near to its tangent
+    real off;    // divided by the cosine of incidence, the largest distance to the sphere along the ray
+    real normal; // error of the normal, for the point where the computed ray hits the sphere
+    real position, turn; // bounds of the chord that ends there; NEVER if none does
 } ChordEnd;
 
 // The bounds of the chord that a ray starts, or NEVER if it does not start one.
 typedef struct {
-    real turn, end_place; // end_place bounds the point where it ends, except for errors computed there
+    real turn, end_position; // end_position bounds the point where it ends, except for errors computed there
     real direction_error;
 } Chord;
 
@@ -58,7 +58,7 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
     mask usable = lanes & (moved <= CHORD_MOVE_MAX * cosine * radius);
     end.radius = lanes_select(usable, radius, (real)(0));
     mask continues = usable & (hit->object == ray->origin_object) & (ray->chord_turn < NEVER);
-    end.place = lanes_select(continues, ray->chord_end_place + moved, NEVER);
+    end.position = lanes_select(continues, ray->chord_end_position + moved, NEVER);
     end.turn = lanes_select(continues, ray->chord_turn, NEVER);
     return end;
 }
@@ -67,7 +67,7 @@ static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd n
 {
     return (ChordEnd){
         lanes_select(condition, yes.radius, no.radius), lanes_select(condition, yes.off, no.off),
-        lanes_select(condition, yes.normal, no.normal), lanes_select(condition, yes.place, no.place),
+        lanes_select(condition, yes.normal, no.normal), lanes_select(condition, yes.position, no.position),
         lanes_select(condition, yes.turn, no.turn)};
 }
 
@@ -80,7 +80,7 @@ static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd n
 // Returns the chord that starts at `end`, for the cosine of the inner angle of incidence. Its direction is
 // off, seen from the normal, by the end's turn and by `turned`, or by `turned_first` if no chord ended
 // there.
-static inline Chord chord_start(const ChordEnd *end, real place_error, real cosine, real turned,
+static inline Chord chord_start(const ChordEnd *end, real position_error, real cosine, real turned,
                                 real turned_first)
 {
     real moved = divide_or(end->off, cosine, NEVER);
@@ -90,13 +90,13 @@ static inline Chord chord_start(const ChordEnd *end, real place_error, real cosi
     real inverse = real_divide((real)(1), lanes_select(end->radius > 0, end->radius, (real)(1)));
     real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
     real turn = lanes_select(continues, end->turn, (real)(0)) + added,
-         place = lanes_select(continues, end->place, place_error) + moved;
+         position = lanes_select(continues, end->position, position_error) + moved;
     // roundings of these sums are below u of the radius; the ends' own bounds have more slack
-    real end_place = real_fma(2 * end->radius, turn, place);
+    real end_position = real_fma(2 * end->radius, turn, position);
     mask usable =
         (end->radius > 0) & (moved <= CHORD_MOVE_MAX * cosine * end->radius) & (turn <= CHORD_TURN_MAX);
-    return (Chord){lanes_select(usable, turn, NEVER), lanes_select(usable, end_place, NEVER),
-                   lanes_select(usable, real_fma(place, inverse, turn), NEVER)};
+    return (Chord){lanes_select(usable, turn, NEVER), lanes_select(usable, end_position, NEVER),
+                   lanes_select(usable, real_fma(position, inverse, turn), NEVER)};
 }
 
 #endif

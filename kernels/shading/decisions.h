@@ -37,7 +37,7 @@ typedef struct {
     global uint *tree; // the sample's records, or NULL
     uint slot_count;
     uint number;    // the ray's number in the tree
-    integer slot;   // each pixel's place in a record
+    integer slot;   // each pixel's index in a record
     mask known;     // the lanes with a record; once that is loaded, with a proven hit
     integer object; // where it is known, the id of the object hit, or -1
     integer events;
@@ -135,9 +135,9 @@ static inline void node_load(TreeNode *node)
     const IntegerLanes slot = {node->slot}, known = {node->known};
     IntegerLanes object, events;
     for (uint lane = 0; lane < LANES; lane++) {
-        const uint place = (uint)slot.each[lane];
-        object.each[lane] = known.each[lane] ? record[place] : 0;
-        events.each[lane] = known.each[lane] ? record[node->slot_count + place] : 0;
+        const uint index = (uint)slot.each[lane];
+        object.each[lane] = known.each[lane] ? record[index] : 0;
+        events.each[lane] = known.each[lane] ? record[node->slot_count + index] : 0;
     }
     node->known = object.all != (integer)(0);
     node->object = object.all - (integer)(2);

@@ -60,31 +60,31 @@ static inline ALWAYS_INLINE bool surface_add_object(Surface *surface, SurfacePoi
     if (object == INT_MAX) return false;
     const ObjectRange range = object_range(scene, (uint)object);
     uint4 entry = range_entry(scene, &range, object);
-    LaneSurfacePoints found;
+    LaneSurfacePoints points;
     if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
         // other precisions pass no pointer, which would keep the surface out of registers
-        found = triangles_surface_point(scene, *pending, &range, entry.z, ray, hit->t,
-                                        IS_CERTIFIED ? surface : 0);
+        points = triangles_surface_point(scene, *pending, &range, entry.z, ray, hit->t,
+                                         IS_CERTIFIED ? surface : 0);
     } else {
-        found.lanes = *pending == (integer)(object);
-        found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
+        points.lanes = *pending == (integer)(object);
+        points.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
     }
-    found.entry = entry;
-    found.uncertain = mask_none();
-    if (IS_CERTIFIED) surface_set_point_errors(surface, &found, scene, ray, hit);
+    points.entry = entry;
+    points.uncertain = mask_none();
+    if (IS_CERTIFIED) surface_set_point_errors(surface, &points, scene, ray, hit);
     Material material = scene->materials[entry.z];
     if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
-        hit_set_images(&found, scene, &material, ray, surface->travelled);
+        points_set_images(&points, scene, &material, ray, surface->travelled);
     if (HAS_NORMAL_MAPS && material.normal_map.x > 0)
-        found.point.shading_normal =
-            normal_tilted(scene, &material, entry.x, &found.images, found.point.shading_normal, found.lanes);
+        points.point.shading_normal = normal_tilted(scene, &material, entry.x, &points.images,
+                                                    points.point.shading_normal, points.lanes);
     // storing the zero in every surface would cost 2 % of a frame's time
     Color3 color =
-        object_color(scene, &material, &found, ray, IS_CERTIFIED ? surface->place_error : (real)(0));
-    if (IS_CERTIFIED) surface->uncertain = surface->uncertain | (found.lanes & found.uncertain);
-    surface_set_material(surface, scene, found.lanes, &material, color);
-    *pending = lanes_select(found.lanes, NO_OBJECT, *pending);
-    surface_point_replace(point, found.lanes, &found.point);
+        object_color(scene, &material, &points, ray, IS_CERTIFIED ? surface->position_error : (real)(0));
+    if (IS_CERTIFIED) surface->uncertain = surface->uncertain | (points.lanes & points.uncertain);
+    surface_set_material(surface, scene, points.lanes, &material, color);
+    *pending = lanes_select(points.lanes, NO_OBJECT, *pending);
+    surface_point_replace(point, points.lanes, &points.point);
     return true;
 }
 

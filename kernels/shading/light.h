@@ -100,7 +100,7 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
     RealLanes column = {floor(columns)}, row = {floor(rows)};
     RealLanes longitude, longitudes, sine, sines;
     for (uint lane = 0; lane < LANES; lane++) {
-        scalar4 cell = scene->sky_cells[(uint)row.each[lane] * SKY_COLUMNS + (uint)column.each[lane]].place;
+        scalar4 cell = scene->sky_cells[(uint)row.each[lane] * SKY_COLUMNS + (uint)column.each[lane]].range;
         longitude.each[lane] = cell.x;
         longitudes.each[lane] = cell.y;
         sine.each[lane] = cell.z;

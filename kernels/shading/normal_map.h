@@ -36,20 +36,20 @@ static inline Tangents shape_tangents(const Scene *scene, uint type, uint index,
     return (Tangents){vector_of(axes.u), vector_of(axes.v)};
 }
 
-// The place of a material's images at a surface point.
+// Where a material's images are looked up for a surface point.
 typedef struct {
     TextureCoordinates coordinates;
     Tangents tangents; // with HAS_NORMAL_MAPS
     Footprint footprint;
-} ImagePlace;
+} ImageLookup;
 
 // Returns the unit shading normal tilted by the material's normal map, for the lanes in `wanted`. A map that
 // is mirrored on the surface has its v on the other side of the normal and u.
 static inline Vector normal_tilted(const Scene *scene, const Material *material, uint type,
-                                   const ImagePlace *place, Vector normal, mask wanted)
+                                   const ImageLookup *lookup, Vector normal, mask wanted)
 {
-    const TextureCoordinates coordinates = place->coordinates;
-    const Tangents tangents = place->tangents;
+    const TextureCoordinates coordinates = lookup->coordinates;
+    const Tangents tangents = lookup->tangents;
     const scalar4 row_u = material->normal_u, row_v = material->normal_v;
     const real zero = (real)(0), one = (real)(1), two = (real)(2), strength = (real)(row_u.w);
     const scalar side = row_u.x * row_v.y < row_u.y * row_v.x ? -1 : 1;
@@ -64,7 +64,7 @@ static inline Vector normal_tilted(const Scene *scene, const Material *material,
     Vector along_v =
         vector_fma(tangents.v, (real)(side * row_u.x), vector_scale(tangents.u, (real)(-side * row_u.y)));
     Vector texel = texture_color(scene, image_wrapped(material->normal_map, type == TYPE_SPHERES), mapped,
-                                 place->footprint, wanted);
+                                 lookup->footprint, wanted);
     real x = strength * real_fma(two, texel.x, -one), y = strength * real_fma(two, texel.y, -one),
          z = real_fma(two, texel.z, -one);
     Vector across = vector_fma(normal, -vector_dot(normal, along_u), along_u);

@@ -18,7 +18,7 @@ static inline Vector sky_blended_color(global const SceneHeader *header, real si
 static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, real latitude_turns,
                                      mask wanted)
 {
-    uint4 level = scene->texture_levels[scene->header->sky_texture.x - 1].place;
+    uint4 level = scene->texture_levels[scene->header->sky_texture.x - 1].range;
     const real one_half = (real)(0.5f);
     RealLanes column = {(longitude_turns + one_half) * (real)((scalar)level.y)};
     RealLanes row = {(one_half - latitude_turns - latitude_turns) * (real)((scalar)level.z)};
@@ -36,11 +36,11 @@ static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, r
 static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)
 {
     global const SceneHeader *header = scene->header;
-    const scalar texels = globe_density(scene->texture_levels[header->sky_texture.x - 1].place);
-    const GridCoordinates place = globe_coordinates((Vector){
+    const scalar texels = globe_density(scene->texture_levels[header->sky_texture.x - 1].range);
+    const GridCoordinates at = globe_coordinates((Vector){
         vector_dot(direction, vector_of(header->sky_right)), vector_dot(direction, vector_of(header->sky_up)),
         vector_dot(direction, vector_of(header->sky_forward))});
-    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), place.u, place.v,
+    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), at.u, at.v,
                                (real)(header->sample.x * texels), wanted);
     return vector_scale(color, (real)(header->sky_forward.w));
 }

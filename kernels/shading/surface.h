@@ -32,7 +32,7 @@ typedef struct {
     real travelled;           // distance from the eye along the path
     // At `certified`, bounds on the distances from the exact ones of the position, of the shading normal,
     // with HAS_TRIANGLES of the geometric normal, and of to_eye; and the uncertain lanes.
-    real place_error, normal_error, geometric_error, eye_error;
+    real position_error, normal_error, geometric_error, eye_error;
     real lift_error;              // with HAS_SMOOTH_NORMALS, bounds the error of `lift`, 0 where none lifts
     real line_error, start_error; // a reflected ray's origin_error and -tmin
     mask uncertain;

@@ -38,9 +38,9 @@ static inline scalar globe_density(uint4 level)
 // Returns a sphere's texture coordinates. Seen from outside, u grows eastward.
 static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere, Vector outward, uint4 level)
 {
-    const GridCoordinates place = globe_coordinates(outward);
+    const GridCoordinates at = globe_coordinates(outward);
     const real radius = fabs((real)(sphere->center_radius.w));
-    return (TextureCoordinates){place.u, place.v, real_divide((real)(globe_density(level)), radius)};
+    return (TextureCoordinates){at.u, at.v, real_divide((real)(globe_density(level)), radius)};
 }
 
 // Returns whether shapes of this type have a grid in the surface, as planes and discs do. This is not one
@@ -74,15 +74,15 @@ static inline GridCoordinates grid_coordinates(const Scene *scene, uint type, ui
                              vector_dot(position, vector_of(axes.v)) + (real)(axes.v.w)};
 }
 
-// Bounds the error of grid coordinates, for a position that is off by `place_error`.
-static inline real grid_error(const Scene *scene, uint type, uint index, Vector position, real place_error)
+// Bounds the error of grid coordinates, for a position that is off by `position_error`.
+static inline real grid_error(const Scene *scene, uint type, uint index, Vector position, real position_error)
 {
     const GridAxes axes = grid_axes(scene, type, index);
     const Vector u = vector_of(axes.u), v = vector_of(axes.v);
     const real moved = real_max(vector_norm1(u), vector_norm1(v)),
                size = real_max(vector_norm1_along(u, position) + (real)(fabs(axes.u.w)),
                                vector_norm1_along(v, position) + (real)(fabs(axes.v.w)));
-    return real_fma(moved, place_error, 8 * UNIT_ROUNDOFF * size);
+    return real_fma(moved, position_error, 8 * UNIT_ROUNDOFF * size);
 }
 
 static inline TextureCoordinates texture_coordinates(const Scene *scene, uint type, uint index,
@@ -93,7 +93,7 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ty
         uint first_level = material->texture.x;
         if (HAS_NORMAL_MAPS && first_level == 0) first_level = material->normal_map.x;
         return sphere_texture_coordinates(&sphere, point->normal,
-                                          scene->texture_levels[first_level - 1].place);
+                                          scene->texture_levels[first_level - 1].range);
     }
     GridCoordinates grid = grid_coordinates(scene, type, index, point->position);
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
@@ -164,10 +164,10 @@ static inline scalar4 image_filtered(const Scene *scene, uint4 image, scalar u, 
         part = 2 * frexp(min(footprint, (scalar)0x1p30f), &exponent) - 1;
         level += (uint)(exponent - 1);
     }
-    if (level >= last) return level_color(scene, image, scene->texture_levels[last].place, u, v);
-    scalar4 color = level_color(scene, image, scene->texture_levels[level].place, u, v);
+    if (level >= last) return level_color(scene, image, scene->texture_levels[last].range, u, v);
+    scalar4 color = level_color(scene, image, scene->texture_levels[level].range, u, v);
     if (part == 0) return color;
-    scalar4 coarser = level_color(scene, image, scene->texture_levels[level + 1].place, u, v);
+    scalar4 coarser = level_color(scene, image, scene->texture_levels[level + 1].range, u, v);
     return scalar4_between(color, coarser, part);
 }
 

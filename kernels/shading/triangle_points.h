@@ -23,7 +23,7 @@ static inline LaneTriangles triangles_gather(const Scene *scene, integer objects
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     const Corners none = {zero, zero, zero};
     const real density = (real)(scene->materials[material].reflection_transmission_ior.w);
-    LaneTriangles hit = {mask_none(), mask_none(), none, none, none, zero, (real)(0), density, false};
+    LaneTriangles triangles = {mask_none(), mask_none(), none, none, none, zero, (real)(0), density, false};
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
         if (object == INT_MAX) break;
@@ -32,45 +32,51 @@ static inline LaneTriangles triangles_gather(const Scene *scene, integer objects
         objects = lanes_select(same, NO_OBJECT, objects);
         uint4 entry = range_entry(scene, range, object);
         if (entry.x != TYPE_TRIANGLES || entry.z != material) continue;
-        hit.lanes = hit.lanes | same;
+        triangles.lanes = triangles.lanes | same;
         Triangle triangle = scene->triangles[entry.y];
-        if (has_eye_height(triangle.id)) hit.next_to_eye = hit.next_to_eye | same;
-        hit.corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), hit.corners);
-        vector_replace(&hit.normal, same, triangle_normal(&triangle));
+        if (has_eye_height(triangle.id)) triangles.next_to_eye = triangles.next_to_eye | same;
+        triangles.corners =
+            corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), triangles.corners);
+        vector_replace(&triangles.normal, same, triangle_normal(&triangle));
         if (HAS_SMOOTH_NORMALS && triangle.id.y > 0) {
-            hit.smooth = true;
-            TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
-            hit.normals = corners_select(same, corners_of(own.a, own.b, own.c), hit.normals);
-            real_replace(&hit.liftable, same, (real)(own.a.w));
+            triangles.smooth = true;
+            TriangleNormals vertex_normals = scene->triangle_normals[triangle.id.y - 1];
+            triangles.normals = corners_select(
+                same, corners_of(vertex_normals.a, vertex_normals.b, vertex_normals.c), triangles.normals);
+            real_replace(&triangles.liftable, same, (real)(vertex_normals.a.w));
         }
         if (HAS_IMAGES && triangle.id.z > 0) {
-            TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
-            hit.uvs = corners_select(same, corners_of_uvs(own), hit.uvs);
-            real_replace(&hit.density, same, (real)(own.c_density.z));
+            TriangleUvs vertex_uvs = scene->triangle_uvs[triangle.id.z - 1];
+            triangles.uvs = corners_select(same, corners_of_uvs(vertex_uvs), triangles.uvs);
+            real_replace(&triangles.density, same, (real)(vertex_uvs.c_density.z));
         }
     }
-    return hit;
+    return triangles;
 }
 
 // Sets the points of flat triangles and returns their weights. Maps the triangles from an instance's space.
-static inline TriangleWeights triangles_set_point(LaneTriangles *hit, const Scene *scene,
+static inline TriangleWeights triangles_set_point(LaneTriangles *triangles, const Scene *scene,
                                                   const ObjectRange *range, const Ray *ray, real t,
                                                   SurfacePoint *point)
 {
     if (!HAS_INSTANCES || !range->is_instance) {
-        const TriangleWeights weights = triangle_weights(hit->corners, ray);
-        *point = corners_surface_point(hit->corners, hit->normal, weights, hit->next_to_eye, ray, t);
+        const TriangleWeights weights = triangle_weights(triangles->corners, ray);
+        *point = corners_surface_point(triangles->corners, triangles->normal, weights, triangles->next_to_eye,
+                                       ray, t);
         return weights;
     }
     const Instance instance = scene->instances[range->instance];
-    Ray own = instance_ray(&instance, ray);
-    ray_prepare(&own);
-    const TriangleWeights weights = triangle_weights(hit->corners, &own);
-    *point = instance_surface_point(&instance, hit->corners, hit->normal, weights);
-    if (hit->smooth) hit->normals = instance_normals(&instance, hit->normals);
-    if (hit->smooth || HAS_NORMAL_MAPS) hit->corners = instance_corners(&instance, hit->corners);
-    const real stretch = instance_stretch(&instance, hit->normal);
-    if (HAS_IMAGES) hit->density = real_divide(hit->density, lanes_select(hit->lanes, stretch, (real)(1)));
+    Ray mapped = instance_ray(&instance, ray);
+    ray_prepare(&mapped);
+    const TriangleWeights weights = triangle_weights(triangles->corners, &mapped);
+    *point = instance_surface_point(&instance, triangles->corners, triangles->normal, weights);
+    if (triangles->smooth) triangles->normals = instance_normals(&instance, triangles->normals);
+    if (triangles->smooth || HAS_NORMAL_MAPS)
+        triangles->corners = instance_corners(&instance, triangles->corners);
+    const real stretch = instance_stretch(&instance, triangles->normal);
+    if (HAS_IMAGES)
+        triangles->density =
+            real_divide(triangles->density, lanes_select(triangles->lanes, stretch, (real)(1)));
     return weights;
 }
 
@@ -81,38 +87,38 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
                                                              const Ray *ray, real t, Surface *surface)
 {
     LaneTriangles triangles = triangles_gather(scene, objects, range, material);
-    LaneSurfacePoints hit;
-    hit.lanes = triangles.lanes;
-    const TriangleWeights weights = triangles_set_point(&triangles, scene, range, ray, t, &hit.point);
+    LaneSurfacePoints points;
+    points.lanes = triangles.lanes;
+    const TriangleWeights weights = triangles_set_point(&triangles, scene, range, ray, t, &points.point);
     const Corners corners = triangles.corners, normals = triangles.normals;
     TriangleHeights heights = {(real)(0), (real)(0), (real)(0), (real)(0)};
     real side = triangles.liftable;
     if (triangles.smooth) {
-        triangle_smooth(normals, weights, &hit.point);
-        mask along = vector_dot(hit.point.normal, ray->direction) > 0,
-             opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < 0;
+        triangle_smooth(normals, weights, &points.point);
+        mask along = vector_dot(points.point.normal, ray->direction) > 0,
+             opposite = vector_dot(points.point.normal, points.point.shading_normal) < 0;
         side = lanes_select(along ^ opposite, -side, side);
-        heights = triangle_lift(corners, normals, weights, side, &hit.point);
+        heights = triangle_lift(corners, normals, weights, side, &points.point);
     }
     if (IS_CERTIFIED) {
         const real slimness = triangle_slimness(corners_edges(corners)),
-                   cosine = least_cosine(hit.point.normal, ray),
-                   height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
+                   cosine = least_cosine(points.point.normal, ray),
+                   height = triangle_height(corners.a, points.point.normal, ray_point(ray, t)),
                    weights_error = triangle_weights_error(corners, ray, cosine);
-        triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
-        surface_narrow_place(surface, hit.lanes, height, cosine);
+        triangle_set_normal_errors(normals, weights, slimness, weights_error, &points.point);
+        surface_narrow_position(surface, points.lanes, height, cosine);
         if (triangles.smooth)
-            triangle_set_lift_error(corners, heights, side, slimness, surface->place_error + weights_error,
-                                    &hit.point);
+            triangle_set_lift_error(corners, heights, side, slimness, surface->position_error + weights_error,
+                                    &points.point);
         else
-            hit.point.height = height;
+            points.point.height = height;
     }
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, triangles.uvs);
-        hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, triangles.density};
-        if (HAS_NORMAL_MAPS) hit.images.tangents = triangle_tangents(corners, triangles.uvs);
+        points.images.coordinates = (TextureCoordinates){uv.x, uv.y, triangles.density};
+        if (HAS_NORMAL_MAPS) points.images.tangents = triangle_tangents(corners, triangles.uvs);
     }
-    return hit;
+    return points;
 }
 
 #endif

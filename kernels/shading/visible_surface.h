@@ -40,13 +40,13 @@ static inline mask may_be_in_contact(const Scene *scene, Vector p, real reach)
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
     mask transparent = surface_found(surface) & surface_is_transparent(surface);
-    real reach = CONTACT_REACH * surface->place_error;
+    real reach = CONTACT_REACH * surface->position_error;
     transparent = transparent & may_be_in_contact(scene, surface->position, reach);
     if (!lanes_any(transparent)) return mask_none();
     Ray inward = ray_make_unit(vector_fma(surface_normal(surface), reach, surface->position),
                                vector_negate(surface_normal(surface)), transparent);
     inward.tmax = reach + reach;
-    inward.origin_error = CONTACT_START_ERRORS * surface->place_error;
+    inward.origin_error = CONTACT_START_ERRORS * surface->position_error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     return transparent & (hit_found(&opaque) | opaque.uncertain);
 }

@@ -63,7 +63,7 @@ static inline SurfacePoint affine_surface_point(const scalar4 rows[3], scalar co
 }
 
 // Returns the image of 0.
-static inline Vector affine_place(const scalar4 rows[3])
+static inline Vector affine_translation(const scalar4 rows[3])
 {
     return (Vector){(real)(rows[0].w), (real)(rows[1].w), (real)(rows[2].w)};
 }

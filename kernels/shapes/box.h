@@ -84,12 +84,12 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     real distance = vector_norm1((Vector){real_max(fabs(to_low.x), fabs(to_high.x)),
                                           real_max(fabs(to_low.y), fabs(to_high.y)),
                                           real_max(fabs(to_low.z), fabs(to_high.z))});
-    real place = ray_place_error(ray, distance) +
-                 UNIT_ROUNDOFF * real_fma((real)(8), distance, 2 * vector_norm1(ray->origin));
-    Interval outer = slabs_common(box_slabs(box, ray, place));
+    real position_error = ray_position_error(ray, distance) +
+                          UNIT_ROUNDOFF * real_fma((real)(8), distance, 2 * vector_norm1(ray->origin));
+    Interval outer = slabs_common(box_slabs(box, ray, position_error));
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();
-    Interval inner = slabs_common(box_slabs(box, ray, -place));
+    Interval inner = slabs_common(box_slabs(box, ray, -position_error));
     mask certain = perhaps & (inner.near < inner.far);
     const CertainInterval inside = {outer, inner, {-NEVER, NEVER}, certain, perhaps};
     return certain_interval_hit(&inside, ray, leaves & certain);
@@ -97,11 +97,11 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
 
 // Sets the errors of a point. Faces that join at an edge have different normals, so another face that is as
 // near as the error makes the lane uncertain.
-static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real place_error,
+static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real position_error,
                                   SurfacePoint *point)
 {
     Vector position = point->position, normal = point->normal;
-    const real zero = (real)(0), error = place_error + place_error;
+    const real zero = (real)(0), error = position_error + position_error;
     Vector low = vector_of(box->low), high = vector_of(box->high);
     real x = interval_end_distance((Interval){low.x, high.x}, position.x);
     real y = interval_end_distance((Interval){low.y, high.y}, position.y);

@@ -47,7 +47,7 @@ typedef struct {
 } CertainHit;
 
 // Returns a bound on the distance of the exact ray from the packet's, up to a distance along it.
-static inline real ray_place_error(const Ray *ray, real distance)
+static inline real ray_position_error(const Ray *ray, real distance)
 {
     return real_fma(ray->direction_error, distance, ray->origin_error);
 }

@@ -40,7 +40,7 @@ static inline CylinderLine cylinder_line(const Round *round, const Ray *ray)
         real_fma(round->direction_norm1, fabs(first), round->start_norm1) + round->radius + round->radius;
     const real in_u = real_fma((real)(3), terms, ROUND_ERROR * vector_norm1(x));
     line.middle_error =
-        BOUND_SLACK * (ray_place_error(ray, ray->length * fabs(line.middle)) + round->shape_error) +
+        BOUND_SLACK * (ray_position_error(ray, ray->length * fabs(line.middle)) + round->shape_error) +
         UNIT_ROUNDOFF * in_u;
     return line;
 }
@@ -53,7 +53,7 @@ static inline real cylinder_half_chord(const CylinderLine *line, real radius)
 }
 
 // Bounds the error of the line's points up to this t from the middle.
-static inline real cylinder_place(const Round *round, const CylinderLine *line, real span)
+static inline real cylinder_position_error(const Round *round, const CylinderLine *line, real span)
 {
     return BOUND_SLACK * real_fma(round->error_per_t, span, line->middle_error);
 }
@@ -70,9 +70,11 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
     // Farther from the middle a slanted line's distance from the axis is at least 8/5 of the radius and its
     // error.
     real span = 2 * (radius + line.middle_error) * line.inverse_length * more;
-    span = cylinder_half_chord(&line, radius + cylinder_place(round, &line, real_min(span, reach))) * more;
-    const real place = cylinder_place(round, &line, lanes_select(line.slanted, real_min(span, reach), reach));
-    const real outer = radius + place, inner = real_max(radius - place, zero),
+    span = cylinder_half_chord(&line, radius + cylinder_position_error(round, &line, real_min(span, reach))) *
+           more;
+    const real position_error =
+        cylinder_position_error(round, &line, lanes_select(line.slanted, real_min(span, reach), reach));
+    const real outer = radius + position_error, inner = real_max(radius - position_error, zero),
                squared = line.squared_distance;
     CertainInterval interval;
     interval.perhaps = lanes & !(line.slanted & (outer * outer < squared));

@@ -26,9 +26,9 @@ typedef struct {
 } Round;
 
 typedef struct {
-    real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
-    real value, band;     // outside if value > band, inside if value < -band
-    Vector across;        // from the axis to the point
+    real rounding, position_error; // bounds of its error: of roundings alone, and with the ray's error
+    real value, band;              // outside if value > band, inside if value < -band
+    Vector across;                 // from the axis to the point
     real rho, radius;
 } RoundPoint;
 
@@ -58,7 +58,8 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     real terms = real_fma(round->direction_norm1, fabs(t), round->start_norm1);
     real in_u = real_min(round->units * terms, real_fma((real)(3), terms, round->units * vector_norm1(x)));
     point.rounding = real_fma((real)(UNIT_ROUNDOFF), in_u, round->shape_error);
-    real place = point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
+    real position_error = point.position_error =
+        point.rounding + ray_position_error(ray, ray->length * fabs(t));
     real z = vector_dot(round->axis, x);
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
@@ -73,13 +74,13 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     }
     if (round->curves) {
         point.value = round->has_power ? from_eye.value : real_fma(point.rho, point.rho, -(round->k * z));
-        point.band = real_fma(place, point.rho + point.rho + place + round->k, band);
+        point.band = real_fma(position_error, point.rho + point.rho + position_error + round->k, band);
         return point;
     }
     real sum = point.rho + fabs(point.radius);
     point.value = (point.rho - point.radius) * sum;
     if (round->has_power) point.value = lanes_select(point.radius < 0, point.value, from_eye.value);
-    point.band = real_fma(place * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), band);
+    point.band = real_fma(position_error * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), band);
     return point;
 }
 
@@ -273,7 +274,7 @@ enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
 
 // Bounds the errors of points. `shape_error` bounds those of the shape's numbers, and `units` is ROUND_ERROR
 // or SLOPED_ROUND_ERROR. The start must be set.
-static inline void round_set_place_errors(Round *round, const Ray *ray, real shape_error, uint units)
+static inline void round_set_position_errors(Round *round, const Ray *ray, real shape_error, uint units)
 {
     round->shape_error = real_fma((real)(2 * UNIT_ROUNDOFF), vector_norm1(ray->origin), shape_error);
     round->units = (real)(units);

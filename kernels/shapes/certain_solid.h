@@ -180,13 +180,13 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 // length, which is rho, or for a paraboloid the gradient's, at least rho and k / 2. To 1 over that half as
 // much is added, since the point is moved onto the surface: 1.5 / max(rho, k / 2) <= 3 / max(rho, k). The
 // normal turns with the axis and, as the slope changes, by half as much again. The ray's error only moves the
-// point, so it counts in place_error alone.
+// point, so it counts in position_error alone.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
-                                    real place_error, SurfacePoint *point)
+                                    real position_error, SurfacePoint *point)
 {
     const Round *round = &solid->round;
     const RoundPoint at = round_point(round, ray, t);
-    real error = 2 * (place_error + at.place);
+    real error = 2 * (position_error + at.position_error);
     real curvature =
         divide_or((real)(round->curves ? 3 : 1), round->curves ? real_max(round->k, at.rho) : at.rho,
                   (real)(1 / SMALLEST_RATIO));
@@ -214,11 +214,11 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
         return round_solid_hit(&solid, shape->id, two_nappes, ray);                                          \
     }                                                                                                        \
                                                                                                              \
-    static inline mask name##_set_errors(const Type *shape, const Ray *ray, real t, real place_error,        \
+    static inline mask name##_set_errors(const Type *shape, const Ray *ray, real t, real position_error,     \
                                          SurfacePoint *point)                                                \
     {                                                                                                        \
         const RoundSolid solid = SOLID;                                                                      \
-        return round_set_errors(&solid, shape->id.y, ray, t, place_error, point);                            \
+        return round_set_errors(&solid, shape->id.y, ray, t, position_error, point);                         \
     }
 
 #endif

@@ -35,7 +35,7 @@ static inline real sphere_far(const CertainSphere *sphere, const Ray *ray)
     return sphere_refine(sphere, ray, sphere->middle_t + sphere->half_chord, sphere->inverse_slope);
 }
 
-// A place that moves by p moves the crossing by p over the cosine there, the least half chord over r. With
+// A point that moves by p moves the crossing by p over the cosine there, the least half chord over r. With
 // x = band / h^2 for the half chord h, that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + SPHERE_STEEPENING x
 // up to x = 3/4. Beyond that, h changes by at most h x (1 + x) / 2 across the ray, and p counts along it,
 // where SPHERE_ALONG x exceeds 1.
@@ -53,7 +53,7 @@ static inline real sphere_far(const CertainSphere *sphere, const Ray *ray)
 // The errors of a line next to a sphere.
 typedef struct {
     real distance; // bounds the start's distance from the center, where that counts
-    real place;    // of points of the line: of the ray, and of rounding
+    real position; // of points of the line: of the ray, and of rounding
     real along;    // of the closest point, along the line
     real band;     // of the square of half the chord
 } SphereErrors;
@@ -65,11 +65,12 @@ static inline SphereErrors sphere_errors(real radius, real middle_t, const Ray *
     const real distance = errors.distance = real_fma(fabs(middle_t), ray->length, radius + radius);
     const real rounding =
         UNIT_ROUNDOFF * real_fma((real)(3), distance, real_fma((real)(6), radius, vector_norm1(ray->origin)));
-    // neither crossings nor the closest point are farther than this and the place
-    const real farthest = distance - radius, place = ray_place_error(ray, farthest) * BOUND_SLACK + rounding;
-    errors.place = real_fma(ray->direction_error, place, place);
+    // neither crossings nor the closest point are farther than this and the error
+    const real farthest = distance - radius,
+               position_error = ray_position_error(ray, farthest) * BOUND_SLACK + rounding;
+    errors.position = real_fma(ray->direction_error, position_error, position_error);
     errors.along = 16 * UNIT_ROUNDOFF * distance;
-    errors.band = real_fma(errors.place * (1 + 8 * UNIT_ROUNDOFF), radius + radius + errors.place,
+    errors.band = real_fma(errors.position * (1 + 8 * UNIT_ROUNDOFF), radius + radius + errors.position,
                            errors.along * errors.along);
     return errors;
 }
@@ -78,7 +79,8 @@ static inline SphereErrors sphere_errors(real radius, real middle_t, const Ray *
 static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, real squared,
                                         const SphereErrors *errors)
 {
-    const real inverse_length = ray_inverse_length(ray), radius = sphere->radius, place = errors->place;
+    const real inverse_length = ray_inverse_length(ray), radius = sphere->radius,
+               position_error = errors->position;
     // In t. If it is uncertain, this is the half chord of the band, between 0 and that of twice the band.
     sphere->half_chord = real_sqrt(real_max(squared, errors->band) * ray->inverse_squared);
     const mask usable = sphere->half_chord > 0;
@@ -87,13 +89,14 @@ static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, r
     const real inverse_chord = inverse * inverse_length, x = errors->band * (inverse_chord * inverse_chord),
                steepness = real_fma(SPHERE_STEEPENING * inverse_chord, x, inverse_chord),
                few_squares = 4 * UNIT_ROUNDOFF * (radius * radius);
-    const real moved = real_fma(real_fma(SPHERE_HALF_BAND, errors->band, real_fma(place, place, few_squares)),
-                                steepness, SPHERE_ALONG * x * place);
+    const real moved = real_fma(
+        real_fma(SPHERE_HALF_BAND, errors->band, real_fma(position_error, position_error, few_squares)),
+        steepness, SPHERE_ALONG * x * position_error);
     sphere->refines = SPHERE_REFINING * errors->along * steepness < 1;
     const real computed =
         lanes_select(sphere->refines, SPHERE_REFINED_ERROR * errors->distance, errors->along + errors->along);
     sphere->t_error = inverse_length * (moved + computed);
-    sphere->middle_error = inverse_length * (place + errors->along);
+    sphere->middle_error = inverse_length * (position_error + errors->along);
 }
 
 // Returns how the lines of the rays in `lanes` cross a sphere.
@@ -105,7 +108,7 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     const real squared = real_fma(radius, radius, -vector_dot(closest, closest));
     const SphereErrors errors = sphere_errors(radius, middle_t, ray);
     // excluded if all of it lies behind the start or beyond the end
-    const real reach = ray_inverse_length(ray) * (radius + 2 * (errors.place + errors.along));
+    const real reach = ray_inverse_length(ray) * (radius + 2 * (errors.position + errors.along));
     const mask apart = ray_excludes(ray, middle_t - reach, middle_t + reach);
     CertainSphere crossed = {.start = start,
                              .radius = radius,

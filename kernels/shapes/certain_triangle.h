@@ -68,10 +68,10 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
 }
 
 // Returns the error across the ray of a vertex up to `distance` from the ray's start and `size` from the eye.
-// Its place before it is rounded may be farther along the ray by u `size`.
-static inline real triangle_place_error(const Ray *ray, real distance, real size)
+// Before it is rounded, it may be farther along the ray by u `size`.
+static inline real triangle_position_error(const Ray *ray, real distance, real size)
 {
-    return ray_place_error(ray, distance) +
+    return ray_position_error(ray, distance) +
            UNIT_ROUNDOFF * real_fma((real)(TRIANGLE_ERROR), distance, VERTEX_ROUNDING * size);
 }
 
@@ -79,7 +79,7 @@ static inline real triangle_place_error(const Ray *ray, real distance, real size
 static inline real triangle_frame_error(const TriangleEdges *edges, const Ray *ray, real size)
 {
     const real distance = vector_norm1(corners_max_abs(edges->seen));
-    return triangle_place_error(ray, distance, size) * ray->across_length;
+    return triangle_position_error(ray, distance, size) * ray->across_length;
 }
 
 // At `certified`, the largest error of a stored normal in addition to its rounding
@@ -114,12 +114,13 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     const CornerReals ts = corners_dot(edges->seen, ray_along(ray));
     real low = real_min_of_3(ts.a, ts.b, ts.c), high = real_max_of_3(ts.a, ts.b, ts.c);
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + 4 * error;
-    real place = triangle_place_error(ray, distance, (real)(sizes.size));
-    real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
+    real position_error = triangle_position_error(ray, distance, (real)(sizes.size));
+    real vertex_error =
+        ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, position_error);
     // most triangles that lines hit lie behind the start or beyond the end
     perhaps = perhaps & (sinks | !ray_excludes(ray, low - vertex_error, high + vertex_error));
     if (!lanes_any(perhaps)) return certain_miss();
-    real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
+    real edge_error = signs.coordinates * real_min(error, position_error * ray->across_length);
     // applies to uncertain lanes, which are hit, if at all, where the weights say
     mask narrows = perhaps & (fabs(edges->determinant) > DIVISOR_MIN * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
@@ -203,7 +204,7 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     return (is_behind & ray->leaves_outward) | (in_front & (along > error)) | (behind & (along < -error));
 }
 
-static inline mask triangle_set_errors(const Triangle *triangle, const Ray *ray, real t, real place_error,
+static inline mask triangle_set_errors(const Triangle *triangle, const Ray *ray, real t, real position_error,
                                        SurfacePoint *point)
 {
     return mask_none();

@@ -100,17 +100,18 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector across = vector_fma(ray->direction, hit.t, f);
     real moved = ray->length, path = moved * fabs(hit.t);
     // 3 u of f and the path are needed, and 4 u of the radius, as for a sphere
-    real place = ray_place_error(ray, path) + moved * (0.5f * (hit.high - hit.low)) +
-                 UNIT_ROUNDOFF * (4 * (vector_norm1(f) + path) + 8 * radius + vector_norm1(ray->origin));
+    real position_error =
+        ray_position_error(ray, path) + moved * (0.5f * (hit.high - hit.low)) +
+        UNIT_ROUNDOFF * (4 * (vector_norm1(f) + path) + 8 * radius + vector_norm1(ray->origin));
     real squared = real_fma(radius, radius, -vector_dot(across, across));
-    real band = place * (radius + radius + place);
+    real band = position_error * (radius + radius + position_error);
     mask within = squared > band, beyond = crosses & (squared < -band);
     hit.uncertain = (hit.uncertain | (hit.found & !within)) & !beyond;
     hit.found = hit.found & within;
     return hit;
 }
 
-static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real place_error,
+static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real position_error,
                                    SurfacePoint *point)
 {
     return plane_point_set_height(disc_foot(disc), disc->normal, point);

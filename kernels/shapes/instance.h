@@ -9,7 +9,7 @@
 // Returns the ray in the mesh's space, with the same t.
 static inline Ray instance_ray(const Instance *instance, const Ray *ray)
 {
-    const Vector from = vector_subtract(ray->origin, affine_place(instance->rows));
+    const Vector from = vector_subtract(ray->origin, affine_translation(instance->rows));
     return ray_make(affine_vector(instance->inverses, from),
                     affine_vector(instance->inverses, ray->direction), ray->tmin, ray->tmax, ray->active);
 }

@@ -80,24 +80,24 @@ typedef struct {
 
 // Bounds the mapped ray's distance from the mapped exact ray. The roundings of 0's image, of the map, of
 // differences and of products add up to 6 u of the mapped vector.
-static inline void oval_ray_set_errors(Ray *own, const Oval *oval, const Ray *ray, Vector from)
+static inline void oval_ray_set_errors(Ray *mapped, const Oval *oval, const Ray *ray, Vector from)
 {
     const real norm = (real)(oval->inverses[0].w), few = (real)(8 * UNIT_ROUNDOFF);
-    own->origin_error = norm * real_fma((real)(2 * UNIT_ROUNDOFF), vector_norm1(affine_place(oval->rows)),
-                                        ray->origin_error) +
-                        few * vector_norm1(affine_reach(oval->inverses, from));
-    own->direction_error = (norm * (ray->length * ray->direction_error) +
-                            few * vector_norm1(affine_reach(oval->inverses, ray->direction))) *
-                           ray_inverse_length(own) * BOUND_SLACK;
-    own->origin_object = ray->origin_object;
-    own->leaves_outward = ray->leaves_outward;
+    mapped->origin_error = norm * real_fma((real)(2 * UNIT_ROUNDOFF),
+                                           vector_norm1(affine_translation(oval->rows)), ray->origin_error) +
+                           few * vector_norm1(affine_reach(oval->inverses, from));
+    mapped->direction_error = (norm * (ray->length * ray->direction_error) +
+                               few * vector_norm1(affine_reach(oval->inverses, ray->direction))) *
+                              ray_inverse_length(mapped) * BOUND_SLACK;
+    mapped->origin_object = ray->origin_object;
+    mapped->leaves_outward = ray->leaves_outward;
 }
 
 // Maps a ray. If it starts far away, its closest point to the center is mapped instead of its start, so that
 // roundings of the map are those of the shape's size and not of the distance.
 static inline OvalRay oval_ray(const Oval *oval, const Ray *ray)
 {
-    const Vector center = affine_place(oval->rows);
+    const Vector center = affine_translation(oval->rows);
     Vector from = vector_subtract(ray->origin, center);
     OvalRay mapped;
     mapped.shift = (real)(0);
@@ -116,26 +116,26 @@ static inline OvalRay oval_ray(const Oval *oval, const Ray *ray)
 
 static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
 {
-    OvalRay own = oval_ray(oval, ray);
+    OvalRay mapped = oval_ray(oval, ray);
     mask hit = mask_none();
-#define OVAL_HIT(name) hit = name##_hit(&shape, &own.ray, &unit_t)
+#define OVAL_HIT(name) hit = name##_hit(&shape, &mapped.ray, &unit_t)
     for (;;) {
-        real unit_t = own.ray.tmax;
+        real unit_t = mapped.ray.tmax;
         OVAL_SWITCH(OVAL_HIT)
-        *t = unit_t + own.shift;
+        *t = unit_t + mapped.shift;
         // a ray that starts at a hit, whose t was rounded, hits the shape there once more
-        mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
+        mask passed = hit & !(*t > ray->tmin) & (unit_t > mapped.ray.tmin);
         if (!lanes_any(passed)) break;
-        real_replace(&own.ray.tmin, passed, unit_t);
+        real_replace(&mapped.ray.tmin, passed, unit_t);
     }
     return hit & (*t > ray->tmin) & (*t < LARGEST);
 }
 
 static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, real t)
 {
-    const OvalRay own = oval_ray(oval, ray);
-    SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
-#define OVAL_SURFACE_POINT(name) unit = name##_surface_point(&shape, &own.ray, t - own.shift)
+    const OvalRay mapped = oval_ray(oval, ray);
+    SurfacePoint unit = surface_point_make(mapped.ray.origin, mapped.ray.direction, (real)(0));
+#define OVAL_SURFACE_POINT(name) unit = name##_surface_point(&shape, &mapped.ray, t - mapped.shift)
     OVAL_SWITCH(OVAL_SURFACE_POINT)
     return affine_surface_point(oval->rows, oval->extent.w, unit.position,
                                 affine_normal(oval->inverses, unit.normal), unit.position,
@@ -144,8 +144,8 @@ static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, 
 
 static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
 {
-    const OvalRay own = oval_ray(oval, ray);
-#define OVAL_CERTAIN_HIT(name) return name##_certain_hit(&shape, &own.ray)
+    const OvalRay mapped = oval_ray(oval, ray);
+#define OVAL_CERTAIN_HIT(name) return name##_certain_hit(&shape, &mapped.ray)
     OVAL_SWITCH(OVAL_CERTAIN_HIT)
     return certain_miss();
 }
@@ -160,18 +160,18 @@ static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
 #define ANY_NORMAL             ((real)(32))
 
 // Sets the errors of a point.
-static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real place_error,
+static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real position_error,
                                    SurfacePoint *point)
 {
-    const OvalRay own = oval_ray(oval, ray);
+    const OvalRay mapped = oval_ray(oval, ray);
     const real norm = (real)(oval->inverses[0].w),
-               moved = ray_place_error(&own.ray, own.ray.length * fabs(t)); // the mapped ray itself
-    SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
+               moved = ray_position_error(&mapped.ray, mapped.ray.length * fabs(t)); // the mapped ray itself
+    SurfacePoint unit = surface_point_make(mapped.ray.origin, mapped.ray.direction, (real)(0));
     mask at_edge = mask_none();
-    const real unit_error = real_fma(norm, place_error, moved);
+    const real unit_error = real_fma(norm, position_error, moved);
 #define OVAL_SET_ERRORS(name)                                                                                \
     OVAL_SURFACE_POINT(name);                                                                                \
-    at_edge = name##_set_errors(&shape, &own.ray, t - own.shift, unit_error, &unit)
+    at_edge = name##_set_errors(&shape, &mapped.ray, t - mapped.shift, unit_error, &unit)
     OVAL_SWITCH(OVAL_SET_ERRORS)
     real growth = divide_or(norm, vector_norm(affine_normal(oval->inverses, unit.normal)), NEVER);
     const real first_order = growth * unit.curvature * unit_error;

@@ -150,7 +150,7 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
     solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
     solid.axis_error = (real)(16 * UNIT_ROUNDOFF);
     const real size = round->has_power ? (real)(0) : solid.widest + solid.half_height;
-    round_set_place_errors(round, ray, solid.axis_error * size, SLOPED_ROUND_ERROR);
+    round_set_position_errors(round, ray, solid.axis_error * size, SLOPED_ROUND_ERROR);
     return solid;
 }
 

@@ -123,7 +123,7 @@ static inline mask plane_point_set_height(Vector on_plane, scalar4 normal, Surfa
     return mask_none();
 }
 
-static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,
+static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real position_error,
                                     SurfacePoint *point)
 {
     return plane_point_set_height(vector_of(plane->point), plane->normal, point);

@@ -240,8 +240,8 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (solid.is_finite)
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
-    round_set_place_errors(round, ray, revolution_set_errors(&solid, sloped, base),
-                           sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
+    round_set_position_errors(round, ray, revolution_set_errors(&solid, sloped, base),
+                              sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
     return solid;
 }
 

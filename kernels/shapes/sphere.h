@@ -237,7 +237,7 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     return certain_select(leaves, other, hit);
 }
 
-static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real t, real place_error,
+static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real t, real position_error,
                                      SurfacePoint *point)
 {
     point->curvature = real_divide((real)(1), (real)(sphere->center_radius.w));

@@ -214,8 +214,8 @@ typedef struct {
 
 typedef struct {
     TorusDistance distance;
-    real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
-    mask outside, known;  // known: the exact ray's point is on the same side
+    real rounding, position_error; // bounds of its error: of roundings alone, and with the ray's error
+    mask outside, known;           // known: the exact ray's point is on the same side
 } TorusPoint;
 
 static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
@@ -236,9 +236,9 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
     point.distance =
         torus_distance(vector_fma(torus->axis, -z, x), ray->direction, z, rise, torus->major, torus->minor);
     point.rounding = real_fma(torus->rounding_per_t, fabs(t), torus->start_rounding);
-    point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
+    point.position_error = point.rounding + ray_position_error(ray, ray->length * fabs(t));
     point.outside = point.distance.value > 0;
-    point.known = fabs(point.distance.value) > point.place;
+    point.known = fabs(point.distance.value) > point.position_error;
     return point;
 }
 
@@ -255,7 +255,7 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     TorusPoint start = torus_point(torus, ray, (real)(0));
     real curvature = torus_curvature(torus, start.distance.rho),
          cosine = fabs(start.distance.slope) * ray_inverse_length(ray);
-    real error = real_fma(2 * start.place, curvature, ray->direction_error) + 32 * UNIT_ROUNDOFF;
+    real error = real_fma(2 * start.position_error, curvature, ray->direction_error) + 32 * UNIT_ROUNDOFF;
     real least = real_divide((real)(2), curvature);
     mask known = cosine > 4 * error; // the exact one is more than the half that is used
     return lanes_select(known, 0.5f * cosine * least * ray_inverse_length(ray), (real)(0));
@@ -273,7 +273,7 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 #define BREAK_BEND   ((real)(0.125f))
 
 // Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
-// is narrowed. Only signs beyond `place` count.
+// is narrowed. Only signs beyond `position_error` count.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
@@ -287,13 +287,14 @@ static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ra
         real_replace(&bracket.near, point.known & before, real_max(bracket.near, t));
         real_replace(&bracket.far, point.known & !before, real_min(bracket.far, t));
         real next = bracket_narrow(&computed, before, t, point.distance.value, point.distance.slope);
-        mask settled = fabs(next - t) * steepness <= TORUS_SETTLED * point.place;
+        mask settled = fabs(next - t) * steepness <= TORUS_SETTLED * point.position_error;
         next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
     }
     mask steep = steepness * ray_inverse_length(ray) > TORUS_STEEPNESS;
-    real width = real_divide(TORUS_SIDE_ERRORS * point.place, lanes_select(steep, steepness, (real)(1)));
+    real width =
+        real_divide(TORUS_SIDE_ERRORS * point.position_error, lanes_select(steep, steepness, (real)(1)));
     const real sides[2] = {t - width, t + width};
     for (uint i = 0; i < 2; i++) {
         TorusPoint side = torus_point(torus, ray, sides[i]);
@@ -335,7 +336,8 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
         real after = is_last ? bounded.part.far : real_min(torus_line_t(&line, breaks[i]), bounded.part.far);
         after = real_max(after, before);
         point = torus_point(&certain, ray, after);
-        mask after_outside = point.outside, after_known = fabs(point.distance.value) > margin * point.place;
+        mask after_outside = point.outside,
+             after_known = fabs(point.distance.value) > margin * point.position_error;
         if (is_last) after_outside = after_known = mask_all();
         mask same_place = after == before; // before the start
         after_outside = lanes_select(same_place, outside, after_outside);
@@ -357,7 +359,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     return hit;
 }
 
-static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, real place_error,
+static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, real position_error,
                                     SurfacePoint *point)
 {
     const CertainTorus certain = certain_torus(torus, ray);

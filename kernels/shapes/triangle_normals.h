@@ -88,12 +88,12 @@ static inline void triangle_set_normal_errors(Corners normals, TriangleWeights w
 
 // Sets the error of the lift in the lanes with a side (docs/numerics.md).
 static inline void triangle_set_lift_error(Corners corners, TriangleHeights heights, real side, real slimness,
-                                           real place_error, SurfacePoint *point)
+                                           real position_error, SurfacePoint *point)
 {
     real size = vector_norm1(corners_max_abs(corners));
     real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(corners_edges(corners))),
                             4 * UNIT_ROUNDOFF * size);
-    real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, place_error) * slimness;
+    real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, position_error) * slimness;
     real height_error = real_fma(weight_error, heights.steepest + rounded, rounded);
     real heights_sum = heights.a + heights.b + heights.c;
     real error = real_fma(weight_error, heights_sum + 3 * height_error, height_error);

@@ -41,7 +41,7 @@ static inline real bounds_max_norm1(Vector origin, scalar4 bounds)
 
 // Bounds the distance between the exact ray and this one within the bounds. If both end at a light, it is in
 // proportion to the distance from there, which matters where a floor runs to the horizon.
-static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
+static inline real bounds_position_error(const Ray *ray, scalar4 bounds)
 {
     real origin_error = ray->origin_error;
     if (ray->ends_at_light) {
@@ -67,7 +67,7 @@ static inline real box_slack(const Ray *ray, scalar4 bounds, scalar hit_slack)
     const real max_norm1 = bounds_max_norm1(ray->origin, bounds);
     if (IS_CERTIFIED) // the exact hit lies in its box
         return real_fma((real)(2 * BOX_ROUNDING_SLACK * UNIT_ROUNDOFF), max_norm1,
-                        bounds_place_error(ray, bounds)) -
+                        bounds_position_error(ray, bounds)) -
                ray->length * ray->tmin;
     return real_fma((real)(hit_slack), bounds_farthest(ray->origin, bounds),
                     BOX_ROUNDING_SLACK * UNIT_ROUNDOFF * max_norm1);

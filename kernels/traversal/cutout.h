@@ -50,7 +50,7 @@ static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 en
 // Returns the lanes in `wanted` where the alpha is too low for a hit.
 static inline mask alpha_is_low(const Scene *scene, uint4 cutout, TextureCoordinates coordinates, mask wanted)
 {
-    const uint4 level = scene->texture_levels[cutout.x - 1].place;
+    const uint4 level = scene->texture_levels[cutout.x - 1].range;
     RealLanes u = {coordinates.u}, v = {coordinates.v};
     IntegerLanes lanes = {wanted}, low = {(integer)(0)};
     for (uint lane = 0; lane < LANES; lane++) {

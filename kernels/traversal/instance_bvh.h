@@ -65,15 +65,15 @@ static OUT_OF_LINE bool instance_traverse(Traversal *traversal, const Scene *sce
 {
     const Instance instance = scene->instances[index];
     const SharedMesh mesh = scene->shared_meshes[instance.id.y];
-    Ray own = instance_ray(&instance, ray);
-    ray_prepare(&own);
+    Ray mapped = instance_ray(&instance, ray);
+    ray_prepare(&mapped);
     const scalar4 bounds = (scalar4)(0, 0, 0, mesh.extent.x + mesh.extent.y + mesh.extent.z);
-    const BoxRays rays = box_rays(&own, bounds, BOX_HIT_SLACK * UNIT_ROUNDOFF);
+    const BoxRays rays = box_rays(&mapped, bounds, BOX_HIT_SLACK * UNIT_ROUNDOFF);
     const mask hits = box_rays_intersect(&rays, -mesh.extent, mesh.extent, traversal_tmax(traversal));
     lanes &= lanes_bits(hits & traversal->active);
     if (lanes == 0) return false;
     traversal->within = instance_range(scene, instance.id.x, INT_MAX, index);
-    mesh_traverse(traversal, scene, &own, &rays, lanes, mesh.place.x);
+    mesh_traverse(traversal, scene, &mapped, &rays, lanes, mesh.root_entry.x);
     traversal->within = outside_instances();
     return true;
 }

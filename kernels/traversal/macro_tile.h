@@ -138,7 +138,7 @@ typedef struct {
     // At `certified`, maxima over all packets: of the exact rays' distance from these within the bounds of
     // the BVH, plus the length that tmin allows before their start; of the error of their origins; and of
     // the error of a vertex across them, over its distance.
-    real place_error, origin_error, vertex_error1;
+    real position_error, origin_error, vertex_error1;
 } PacketBounds;
 
 // Adds a packet with active rays, unless one of its slopes is too large.
@@ -167,9 +167,9 @@ static inline void tile_add(MacroTile *tile, PacketBounds *bounds, const Scene *
     bounds->v_max[packet] = lanes_select(active, -v, none);
     bounds->reach_max[packet] = lanes_select(active, -reach, none);
     if (IS_CERTIFIED) {
-        real place_error = bounds_place_error(ray, scene->header->bounds) - ray->length * ray->tmin;
+        real position_error = bounds_position_error(ray, scene->header->bounds) - ray->length * ray->tmin;
         real vertex_error1 = ray->direction_error + (real)((TRIANGLE_ERROR + 1) * UNIT_ROUNDOFF);
-        bounds->place_error = real_max(bounds->place_error, lanes_select(active, place_error, zero));
+        bounds->position_error = real_max(bounds->position_error, lanes_select(active, position_error, zero));
         bounds->origin_error = real_max(bounds->origin_error, lanes_select(active, ray->origin_error, zero));
         bounds->vertex_error1 = real_max(bounds->vertex_error1, lanes_select(active, vertex_error1, zero));
     }
@@ -216,7 +216,7 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     tile->vertex_error0 = 0;
     tile->vertex_error1 = (VERTEX_TEST_ERROR + VERTEX_BLOCK_ERROR) * UNIT_ROUNDOFF;
     if (IS_CERTIFIED) {
-        tile->slack += lanes_largest(mask_all(), bounds->place_error);
+        tile->slack += lanes_largest(mask_all(), bounds->position_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
         const scalar error1 = (scalar)(CERTIFIED_VERTEX_ERROR * NORM1_PER_DISTANCE) *
                               lanes_largest(mask_all(), bounds->vertex_error1);

@@ -117,7 +117,7 @@ PRIMITIVE_LIST(INTERSECT_NEAR_SHAPES)
 // Returns the index of a block's first triangle.
 static inline uint block_first(const Scene *scene, uint block)
 {
-    return ((global const uint *)scene->block_places)[block];
+    return ((global const uint *)scene->block_triangles)[block];
 }
 
 #if LANES > 1
@@ -141,7 +141,7 @@ static inline Vector block_centers(global const SphereBlock *block)
 static inline Sphere block_sphere(const Scene *scene, global const SphereBlock *block, uint lane)
 {
     const uint id = ((global const uint *)block->ids)[lane];
-    if (RARELY(id & SPHERE_HAS_FLAGS)) return scene->spheres[((global const uint *)block->places)[lane]];
+    if (RARELY(id & SPHERE_HAS_FLAGS)) return scene->spheres[((global const uint *)block->indices)[lane]];
     scalar4 center_radius = (scalar4)(block_row(block, 0)[lane], block_row(block, 1)[lane],
                                       block_row(block, 2)[lane], block_row(block, 3)[lane]);
     return (Sphere){center_radius, (uint4)(id, 0, 0, 0)};

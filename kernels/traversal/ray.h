@@ -36,7 +36,7 @@ typedef struct {
     // it (shapes/triangle.h), and whether it certainly runs back to the triangle's plane.
     mask is_lifted, sinks;
     // the Chord's (shading/chords.h) if the ray runs along one of the sphere that it leaves, else NEVER
-    real chord_turn, chord_end_place;
+    real chord_turn, chord_end_position;
     real length;        // the direction's length, not below the exact one, within 48 u
     real across_length; // set by ray_prepare: a bound on the length of across_u and across_v
     Vector inverse;     // set by ray_prepare for boxes: 1 / direction
@@ -124,7 +124,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
         if (HAS_SMOOTH_NORMALS) ray.is_lifted = ray.sinks = mask_none();
-        if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
+        if (HAS_CHORDS) ray.chord_turn = ray.chord_end_position = NEVER;
     }
     ray.active = active & (ray.squared > 0);
     // 0 in inactive lanes, which only a sphere around the origin still examines

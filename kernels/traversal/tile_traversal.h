@@ -211,7 +211,7 @@ static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scen
     tile.active = 0;
     const uint lowest = lowest_bit(packets);
     tile.frame = origin_frame(scene, &rays[lowest], traversals[lowest].active);
-    if (IS_CERTIFIED) bounds.place_error = bounds.origin_error = bounds.vertex_error1 = (real)(0);
+    if (IS_CERTIFIED) bounds.position_error = bounds.origin_error = bounds.vertex_error1 = (real)(0);
     for (uint i = 0; i < LANES; i++) {
         bounds.u_min[i] = bounds.u_max[i] = bounds.v_min[i] = bounds.v_max[i] = bounds.reach_max[i] =
             (real)(LARGEST);
