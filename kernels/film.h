@@ -1,4 +1,4 @@
-// The pixels of each work-item in a band of the image, and where their values are stored.
+// Finds the pixels of each work-item in a band of the image, and stores their values.
 #ifndef FILM_H
 #define FILM_H
 

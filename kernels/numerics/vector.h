@@ -1,5 +1,5 @@
-// Vectors with one value per lane. dot and cross are written out, because the built-in ones may have any
-// relative error (The OpenCL C Specification 3.0, Relative Error as ULPs).
+// Computes with vectors of one value per lane. dot and cross are written out, because the built-in ones may
+// have any relative error (The OpenCL C Specification 3.0, Relative Error as ULPs).
 #ifndef VECTOR_H
 #define VECTOR_H
 

@@ -1,4 +1,4 @@
-// Colors, linear RGB.
+// Computes with linear RGB colors.
 #ifndef COLOR_H
 #define COLOR_H
 

@@ -1,4 +1,4 @@
-// The laws of reflection and refraction at a surface.
+// Implements the laws of reflection and refraction at a surface.
 #ifndef OPTICS_H
 #define OPTICS_H
 

@@ -1,4 +1,4 @@
-// Phong's reflection (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
+// Implements Phong's reflection (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
 #ifndef PHONG_H
 #define PHONG_H
 

@@ -1,4 +1,4 @@
-// The surface at a hit: its position, normals and material.
+// Defines the surface at a hit: its position, normals and material.
 #ifndef SURFACE_H
 #define SURFACE_H
 

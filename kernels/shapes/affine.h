@@ -1,4 +1,4 @@
-// Affine maps between the space of a shape and that of the eye, as three rows of a matrix.
+// Maps vectors between the space of a shape and that of the eye. An affine map is three rows of a matrix.
 #ifndef AFFINE_H
 #define AFFINE_H
 

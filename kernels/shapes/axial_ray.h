@@ -1,5 +1,5 @@
-// A ray relative to a shape's axis w, in pairs. F is a point of the axis, and f leads from F to the ray's
-// origin. m = f x w and q = d x w are perpendicular to the axis, and E = f x d is the moment.
+// Describes a ray relative to a shape's axis w, in pairs. F is a point of the axis, and f leads from F to the
+// ray's origin. m = f x w and q = d x w are perpendicular to the axis, and E = f x d is the moment.
 #ifndef AXIAL_RAY_H
 #define AXIAL_RAY_H
 

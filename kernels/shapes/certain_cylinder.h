@@ -67,8 +67,7 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
     const CylinderLine line = cylinder_line(round, ray);
     const real from = real_max(part.near, ray->tmin), to = real_min(part.far, end);
     const real reach = real_max(fabs(from), fabs(to)) + fabs(line.middle);
-    // Farther from the middle a slanted line's distance from the axis is at least 8/5 of the radius and its
-    // error.
+    // Beyond this span a slanted line is farther from the axis than 8/5 of the radius and its error.
     real span = 2 * (radius + line.middle_error) * line.inverse_length * more;
     span = cylinder_half_chord(&line, radius + cylinder_position_error(round, &line, real_min(span, reach))) *
            more;

@@ -126,9 +126,9 @@ static inline mask solid_is_off_line(const RoundSolid *solid, bool two_nappes, c
     if (round->has_power || (round->curves && !solid->is_finite)) return mask_none();
     real reach = solid->widest + round->start_error;
     if (solid->is_finite) {
-        // The exact ray reaches the solid within `farthest` and its error there, which therefore exceeds that
-        // at `farthest` by less than g / (1 - g) of it for the direction's error g, or a 60th. The 2% of
-        // line_is_off_axis cover it.
+        // The exact ray reaches the solid within `farthest` and its error there. With an error g of the
+        // direction, that error exceeds the one at `farthest` by less than g / (1 - g) of it, or a 60th. The
+        // 2% of line_is_off_axis cover this.
         const real farthest =
             vector_norm1(round->start) + solid->widest + real_max(fabs(solid->low), fabs(solid->high));
         reach = real_fma(round->error_per_t, farthest * ray_inverse_length(ray), reach);

@@ -6,12 +6,15 @@
 #include "traversal/ray.h"
 
 // Returns the lanes whose line from + t d stays farther than the reach from the axis w through 0, by 2% if
-// error_per_t is 0, although its points may be off by error_per_t |t|. With q = d x w the line's distance is
-// |from . q| / |q| at the closest point, where |t| is at most |from| |w| / |q|. If error_per_t is at most an
-// eighth of |q| / |w|, points farther along the line lose less than they gain, up to a factor of 1.016 for
-// the squares. Roundings change the sides by less than 15 u (|from| + reach) |d| |w|. By (a + b)^2 <= (1 + m)
-// a^2 + (1 + 1 / m) b^2 with m = 1/64 or, with an error_per_t, m = 0.045, 29,300 of the 2^15 and 47 of the
-// 2^7 are needed.
+// error_per_t is 0, although its points may be off by error_per_t |t|.
+//
+// With q = d x w the line's distance is |from . q| / |q| at the closest point, where |t| is at most
+// |from| |w| / |q|. If error_per_t is at most an eighth of |q| / |w|, points farther along the line lose less
+// than they gain, up to a factor of 1.016 for the squares. Roundings change the sides by less than
+// 15 u (|from| + reach) |d| |w|.
+//
+// The constants follow from (a + b)^2 <= (1 + m) a^2 + (1 + 1 / m) b^2. With m = 1/64, 29,300 of the 2^15 are
+// needed. Where there is an error_per_t, m is 0.045 and 47 of the 2^7 are needed.
 static inline mask line_is_off_axis(Vector from, real squared_reach, Vector axis, real squared_axis,
                                     real error_per_t, const Ray *ray)
 {
@@ -26,13 +29,18 @@ static inline mask line_is_off_axis(Vector from, real squared_reach, Vector axis
 }
 
 // Returns the lanes whose line from + t d certainly stays off the double cone of a slope k around the unit
-// axis w through its apex 0. The plane through the line and the apex, with the normal n = from x d, decides:
-// it stays off the cone if |n . w| / |n|, the sine of its angle to the axis, exceeds k / sqrt(1 + k^2), the
-// sine of the cone's angle. The line's points are at least |n| / |d| from the apex and off by start_error +
-// error_per_t |t|, where error_per_t |d| is at least 16 u |d|^2 for roundings. Over that distance this is at
-// most (start_error |d| + 2 error_per_t |from|) / |n|, to which the sine of the difference of both angles, at
-// least the difference of their sines, is compared. By (a + b)^2 <= (1 + 1/16) a^2 + 17 b^2 and twice the
-// squares of b's terms, 34 of each square are needed.
+// axis w through its apex 0.
+//
+// The plane through the line and the apex has the normal n = from x d. It stays off the cone if the sine of
+// its angle to the axis, |n . w| / |n|, exceeds the sine of the cone's angle, k / sqrt(1 + k^2).
+//
+// The line's points are off by start_error + error_per_t |t|, where error_per_t |d| is at least 16 u |d|^2
+// for roundings. They are at least |n| / |d| from the apex, so the error is at most
+// (start_error |d| + 2 error_per_t |from|) / |n| of their distance. The difference of both sines must exceed
+// it, since the sine of the difference of both angles is at least that.
+//
+// By (a + b)^2 <= (1 + 1/16) a^2 + 17 b^2 and twice the squares of b's two terms, each square counts 34
+// times.
 static inline mask line_is_off_cone(Vector from, real slope, Vector axis, real start_error, real error_per_t,
                                     const Ray *ray)
 {

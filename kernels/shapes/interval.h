@@ -1,4 +1,4 @@
-// Intervals of t.
+// Computes with intervals of t.
 #ifndef INTERVAL_H
 #define INTERVAL_H
 

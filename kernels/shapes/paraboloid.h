@@ -1,4 +1,5 @@
-// A paraboloid: |p x w|^2 = k (p . w) for the axis w from the apex, with k = 4 |w| times the focal length.
+// Intersects paraboloids, |p x w|^2 = k (p . w) for the axis w from the apex, with k = 4 |w| times the focal
+// length.
 //
 // Along a ray p = f + t d, with q = d x w and m = f x w:
 //     a = q . q,   b = m . q - k/2 (d . w),   c = m . m - k (f . w),

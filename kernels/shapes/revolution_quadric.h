@@ -1,5 +1,5 @@
-// A cylinder or cone, |p x w| = R + k (p . w) for the axis w from the base, with R = |w| times the radius
-// there and k the tangent of the half-angle.
+// Computes the quadratic of a ray and a cylinder or cone, |p x w| = R + k (p . w) for the axis w from the
+// base, with R = |w| times the radius there and k the tangent of the half-angle.
 //
 // Along a ray p = f + t d, with q = d x w, m = f x w, g = R + k f . w and h = k d . w:
 //     a = q . q - h^2,   b = m . q - g h,   c = m . m - g^2,

@@ -1,5 +1,5 @@
-// A sphere. With f from the center to the ray's start, b = f . d, c = f . f - r^2, and the discriminant is
-// b^2 - a c.
+// Intersects spheres. With f from the center to the ray's start, b = f . d, c = f . f - r^2, and the
+// discriminant is b^2 - a c.
 #ifndef SPHERE_H
 #define SPHERE_H
 

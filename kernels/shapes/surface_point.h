@@ -1,4 +1,4 @@
-// A point of a surface, as a shape's formulas compute it.
+// Defines a point of a surface, as a shape's formulas compute it.
 #ifndef SURFACE_POINT_H
 #define SURFACE_POINT_H
 

@@ -1,5 +1,5 @@
-// A torus, intersected from the ray's closest approach to the center (shapes/torus_line.h) or as seen from
-// the eye.
+// Intersects tori, from the ray's closest approach to the center (shapes/torus_line.h) or as seen from the
+// eye.
 //
 // With the eye's power the zeros are those of F / (2 r), F = (rho - R)^2 + z^2 - r^2, from the eye on. For a
 // point x from there, with the parts x_u along `radial`, x_v across it and x_w along the axis,

@@ -1,4 +1,4 @@
-// Conservative bounding-sphere culling for packets with a common origin.
+// Culls bounding spheres conservatively, for packets with a common origin.
 #ifndef CULL_SPHERE_H
 #define CULL_SPHERE_H
 

@@ -1,4 +1,5 @@
-// Traverses the meshes that instances share, with rays in the mesh's space. Leaves have only triangles.
+// Traverses the meshes that instances share, with rays in the mesh's space. Leaves have only triangles. The
+// loops repeat those of single.h and packet.h, because functions of OpenCL C cannot call themselves.
 #ifndef INSTANCE_BVH_H
 #define INSTANCE_BVH_H
 
