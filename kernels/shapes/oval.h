@@ -4,11 +4,11 @@
 #define OVAL_H
 
 #include "shapes/affine.h"
+#include "shapes/certain_torus.h"
 #include "shapes/disc.h"
 #include "shapes/paraboloid.h"
 #include "shapes/revolution.h"
 #include "shapes/sphere.h"
-#include "shapes/torus.h"
 
 // Runs STATEMENT(name) for the unit shape that the oval maps, declared as `shape`.
 #define OVAL_SWITCH(STATEMENT)                                                                               \

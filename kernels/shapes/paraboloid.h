@@ -111,7 +111,8 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
-    if (has_eye_power(shape->id)) { // the foot is near the eye, the apex may be far
+    const bool has_power = has_eye_power(shape->id);
+    if (has_power) { // the foot is near the eye, the apex may be far
         Vector from_foot = ray_point_from(ray, vector_of(shape->foot_lift), t);
         real height = real_divide(vector_dot(from_foot, axis), squared_axis);
         normal = vector_fma(axis, -(height + half_lift), from_foot);
@@ -122,11 +123,11 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
 
     if (shape->id.y & REVOLUTION_CAPPED) {
         real end = (real)(shape->axis_end.w), height = vector_dot(p, axis);
-        if (has_eye_power(shape->id)) height -= (real)(shape->foot_lift.w);
+        if (has_power) height -= (real)(shape->foot_lift.w);
         real gap = real_divide(end - height, squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
-        if (has_eye_power(shape->id)) surface_point_move_to_ray(&cap, ray, t, size);
+        if (has_power) surface_point_move_to_ray(&cap, ray, t, size);
         surface_point_replace(&point, ends_on_cap(&crossings, t), &cap);
     }
     return point;

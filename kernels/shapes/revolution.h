@@ -192,7 +192,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
         const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
         // relative to the rounded F, the point of a thin plate could appear at its other end
-        if (has_eye_power(shape->id)) height = vector_dot(ray_point(ray, t), vector_of(shape->axis_slope));
+        if (has_power) height = vector_dot(ray_point(ray, t), vector_of(shape->axis_slope));
         SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
         if (has_power) surface_point_move_to_ray(&cap, ray, t, rounding_scale);
         surface_point_replace(&point, ends_on_cap(&crossings, t), &cap);
