@@ -218,6 +218,19 @@ static inline uint block_triangles_near(global const TriangleBlock *block, uint 
     return lanes_bits(near) & ((1u << count) - 1);
 }
 
+// Intersects the triangles of a block that are given as bits.
+static inline bool intersect_block_triangles(Traversal *traversal, const Scene *scene, const Ray *ray,
+                                             uint first, uint triangles)
+{
+    bool found_any = false;
+    for (; triangles != 0; triangles &= triangles - 1) {
+        const uint triangle = first + lowest_bit(triangles);
+        found_any |= intersect_triangle(traversal, scene, ray, scene->triangles[triangle]);
+        if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;
+    }
+    return found_any;
+}
+
 // Intersects the first `count` triangles of a block with the rays of some lanes, given as bits.
 static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Scene *scene, const Ray *ray,
                                                  uint index, uint count, uint lanes)
@@ -229,12 +242,7 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
         for (; lanes != 0; lanes &= lanes - 1)
             near |= block_triangles_near(&scene->triangle_blocks[index], count, ray, lowest_bit(lanes));
     }
-    bool found_any = false;
-    for (; near != 0; near &= near - 1) {
-        found_any |= intersect_triangle(traversal, scene, ray, scene->triangles[first + lowest_bit(near)]);
-        if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;
-    }
-    return found_any;
+    return intersect_block_triangles(traversal, scene, ray, first, near);
 }
 #endif
 

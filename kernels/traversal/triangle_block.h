@@ -303,15 +303,10 @@ static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Sce
     }
     for (; tested != 0; tested &= tested - 1) {
         const uint packet = lowest_bit(tested);
-        Traversal *traversal = &tile->traversals[packet];
         tile_prepare(tile, packet);
-        bool is_hit = false;
-        for (uint left = remaining[packet]; left != 0; left &= left - 1) {
-            const uint triangle = first + lowest_bit(left);
-            is_hit |= intersect_triangle(traversal, scene, &tile->rays[packet], scene->triangles[triangle]);
-            if (is_shadow && !lanes_any(traversal->active)) break;
-        }
-        if (is_hit) tile_update(tile, packet);
+        if (intersect_block_triangles(&tile->traversals[packet], scene, &tile->rays[packet], first,
+                                      remaining[packet]))
+            tile_update(tile, packet);
     }
 }
 
