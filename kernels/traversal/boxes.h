@@ -142,6 +142,19 @@ static inline uint box_rays_same_octant(const BoxRays *rays, uint lanes)
     return lanes & (x & first ? x : ~x) & (y & first ? y : ~y) & (z & first ? z : ~z);
 }
 
+// Returns where rays are between the near and the far planes of boxes, between tmin and tmax. Sets *entry to
+// where they enter.
+static inline mask slabs_intersect(Vector near, Vector far, Vector inverse, Vector to_near, Vector to_far,
+                                   real tmin, real tmax, real *entry)
+{
+    const Vector enter = {real_fma(near.x, inverse.x, to_near.x), real_fma(near.y, inverse.y, to_near.y),
+                          real_fma(near.z, inverse.z, to_near.z)};
+    const Vector leave = {real_fma(far.x, inverse.x, to_far.x), real_fma(far.y, inverse.y, to_far.y),
+                          real_fma(far.z, inverse.z, to_far.z)};
+    *entry = real_max(real_max(enter.x, enter.y), real_max(enter.z, tmin));
+    return *entry <= real_min(real_min(leave.x, leave.y), real_min(leave.z, tmax));
+}
+
 static inline real box_plane(global const scalar *box, uint plane)
 {
     return (real)(box[plane * BVH_WIDTH]);
@@ -152,15 +165,11 @@ static inline real box_plane(global const scalar *box, uint plane)
 static inline mask box_rays_intersect_child(const BoxRays *rays, Octant octant, global const scalar *box,
                                             real tmax, real *entry)
 {
-    Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
-    real entry_x = real_fma(box_plane(box, octant.near_x), inverse.x, to_near.x);
-    real entry_y = real_fma(box_plane(box, octant.near_y), inverse.y, to_near.y);
-    real entry_z = real_fma(box_plane(box, octant.near_z), inverse.z, to_near.z);
-    real exit_x = real_fma(box_plane(box, octant.far_x), inverse.x, to_far.x);
-    real exit_y = real_fma(box_plane(box, octant.far_y), inverse.y, to_far.y);
-    real exit_z = real_fma(box_plane(box, octant.far_z), inverse.z, to_far.z);
-    *entry = real_max(real_max(entry_x, entry_y), real_max(entry_z, rays->tmin));
-    return *entry <= real_min(real_min(exit_x, exit_y), real_min(exit_z, tmax));
+    const Vector near = {box_plane(box, octant.near_x), box_plane(box, octant.near_y),
+                         box_plane(box, octant.near_z)};
+    const Vector far = {box_plane(box, octant.far_x), box_plane(box, octant.far_y),
+                        box_plane(box, octant.far_z)};
+    return slabs_intersect(near, far, rays->inverse, rays->to_near, rays->to_far, rays->tmin, tmax, entry);
 }
 
 #endif

@@ -135,24 +135,14 @@ typedef struct {
 static inline mask ray_intersects_children(const BoxRays *rays, uint lane, global const scalar *boxes,
                                            scalar tmax, real *entry)
 {
-    Octant octant = octant_of_lane(rays, lane);
-    real inverse_x = real_of_lane(&rays->inverse.x, lane);
-    real inverse_y = real_of_lane(&rays->inverse.y, lane);
-    real inverse_z = real_of_lane(&rays->inverse.z, lane);
-    real entry_x =
-        real_fma(children_plane(boxes, octant.near_x), inverse_x, real_of_lane(&rays->to_near.x, lane));
-    real entry_y =
-        real_fma(children_plane(boxes, octant.near_y), inverse_y, real_of_lane(&rays->to_near.y, lane));
-    real entry_z =
-        real_fma(children_plane(boxes, octant.near_z), inverse_z, real_of_lane(&rays->to_near.z, lane));
-    real exit_x =
-        real_fma(children_plane(boxes, octant.far_x), inverse_x, real_of_lane(&rays->to_far.x, lane));
-    real exit_y =
-        real_fma(children_plane(boxes, octant.far_y), inverse_y, real_of_lane(&rays->to_far.y, lane));
-    real exit_z =
-        real_fma(children_plane(boxes, octant.far_z), inverse_z, real_of_lane(&rays->to_far.z, lane));
-    *entry = real_max(real_max(entry_x, entry_y), real_max(entry_z, real_of_lane(&rays->tmin, lane)));
-    return *entry <= real_min(real_min(exit_x, exit_y), real_min(exit_z, (real)(tmax)));
+    const Octant octant = octant_of_lane(rays, lane);
+    const Vector near = {children_plane(boxes, octant.near_x), children_plane(boxes, octant.near_y),
+                         children_plane(boxes, octant.near_z)};
+    const Vector far = {children_plane(boxes, octant.far_x), children_plane(boxes, octant.far_y),
+                        children_plane(boxes, octant.far_z)};
+    return slabs_intersect(near, far, vector_of_lane(&rays->inverse, lane),
+                           vector_of_lane(&rays->to_near, lane), vector_of_lane(&rays->to_far, lane),
+                           real_of_lane(&rays->tmin, lane), (real)(tmax), entry);
 }
 
 // A group during traversal.
