@@ -19,6 +19,11 @@ int tests_run(int argument_count, char **arguments, CMFixtureFunction setup, CMF
     return _cmocka_run_group_tests("tests", tests, test_count, setup, teardown);
 }
 
+double error_max(double a, double b)
+{
+    return a > b || isnan(a) ? a : b;
+}
+
 void check_only_message(MessageList *messages, const char *expected)
 {
     assert_int_equal(messages->count, 1);

@@ -23,6 +23,10 @@
 // Returns formatted text, valid until the fourth call after this one.
 const char *formatted(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
+// Returns the larger of two errors, or NaN if one is NaN, so that every comparison with a bound then fails.
+// fmax would drop NaN.
+double error_max(double a, double b);
+
 // Fails the test unless there is exactly one message, with this text. Frees the list.
 void check_only_message(MessageList *messages, const char *expected);
 

@@ -226,7 +226,8 @@ def read(path):
 
 
 def npy_read(path):
-    """Returns shape, type and pixels of an image of float, double or unsigned. Pixels are numbers, or tuples if it has channels."""
+    """Returns shape, type and pixels of an image of float, double or unsigned. Pixels are numbers, or tuples if it has channels.
+    Fails at NaN, since comparisons with it may pass."""
     data = Path(path).read_bytes()
     assert data[:8] == b"\x93NUMPY\x01\x00", path
     (length,) = struct.unpack("<H", data[8:10])
@@ -235,6 +236,7 @@ def npy_read(path):
     letter = {"<f4": "f", "<f8": "d", "<u4": "I"}[head["descr"]]
     channels = math.prod(head["shape"][2:])
     pixels = list(struct.iter_unpack(f"<{channels}{letter}", data[10 + length :]))
+    assert not any(math.isnan(value) for pixel in pixels for value in pixel), path
     return head["shape"], head["descr"], pixels if head["shape"][2:] else [value for (value,) in pixels]
 
 

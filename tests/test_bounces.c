@@ -133,7 +133,7 @@ static double unit_roundoff(Precision precision)
 
 static double largest_difference(Color a, Color b)
 {
-    return fmax(fabs(a.x - b.x), fmax(fabs(a.y - b.y), fabs(a.z - b.z)));
+    return error_max(fabs(a.x - b.x), error_max(fabs(a.y - b.y), fabs(a.z - b.z)));
 }
 
 // Returns how far the pixel's color moves if its rays move.
@@ -143,7 +143,7 @@ static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Tri
     double largest = 0;
     for (uint64_t seed = 1; seed <= BLURRED_COUNT; seed++) {
         const ReferencePath path = {.bounce_count = trial->bounce_count, .blur = BLUR * u, .seed = seed};
-        largest = fmax(largest, largest_difference(reference_path_color(scene, ray, &path), color));
+        largest = error_max(largest, largest_difference(reference_path_color(scene, ray, &path), color));
     }
     return largest;
 }

@@ -78,13 +78,6 @@ typedef struct {
     double t, normal, place; // the largest errors, as parts of their bounds
 } Tally;
 
-// Keeps the largest part of a bound, which NaN would leave as it is.
-static void tally_add(double *largest, double part)
-{
-    if (isnan(part)) fail_msg("NaN");
-    *largest = fmax(*largest, part);
-}
-
 // The bounds are those of other shapes (docs/numerics.md), with a size that the map's stretch multiplies.
 static void hit_compare(const Object *object, const TraceRay *ray, const TraceHit *hit, Precision precision,
                         const char *what, Tally *tally)
@@ -113,16 +106,16 @@ static void hit_compare(const Object *object, const TraceRay *ray, const TraceHi
     if (!exact.found) return;
     tally->hits++;
     const double t_bound = 8 * u * (double)exact.t + moved / ((double)exact.cosine * length);
-    tally_add(&tally->t, fabs((double)(hit->t - exact.t)) / t_bound);
+    tally->t = error_max(tally->t, fabs((double)(hit->t - exact.t)) / t_bound);
     const double normal_bound =
         16 * u * stretch +
         4 * u * (distance + stretch * size) / ((double)exact.cosine * (double)exact.curvature_radius);
-    tally_add(&tally->normal, reference_distance(hit->normal, exact.normal) / normal_bound);
+    tally->normal = error_max(tally->normal, reference_distance(hit->normal, exact.normal) / normal_bound);
     const Vector3 place = hit->position;
     const ReferenceSurface there = reference_surface(object, quad3(place));
     const double place_bound =
         u * (24 * stretch * size + 8 * vector_length(place) + 4 * length * (double)exact.t);
-    tally_add(&tally->place, (double)reference_surface_distance(&there) / place_bound);
+    tally->place = error_max(tally->place, (double)reference_surface_distance(&there) / place_bound);
 }
 
 // Rays along the normal from outside an ellipsoid do not hit it again, however near it the next ray starts.

@@ -117,15 +117,14 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
         tolerance->slack * scale + moved_beyond(&scene->objects.items[hit->object], expected, point,
                                                 has_eye_powers, tolerance->compensated, u, trial->radius);
     t_bound += moved / (cosine * vector_length(direction));
-    tally->t = fmax(tally->t, (double)((hit->t - expected->t) / t_bound));
-    tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_bound));
+    tally->t = error_max(tally->t, fabs((double)(hit->t - expected->t)) / t_bound);
 
     Vector3 normal = hit->normal;
     double normal_bound =
         8 * u + tolerance->turn * u * distance / (cosine * (double)expected->curvature_radius);
-    tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_bound);
-    tally->length = fmax(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
-    if (vector_dot(normal, direction) > 0) tally->wrong++;
+    tally->normal = error_max(tally->normal, reference_distance(normal, expected->normal) / normal_bound);
+    tally->length = error_max(tally->length, fabs(vector_length(normal) - 1) / (4 * u));
+    if (!(vector_dot(normal, direction) <= 0)) tally->wrong++;
 }
 
 // Returns a ray in any direction from next to where the given one hits the scene, off it to either side by a

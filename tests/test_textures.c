@@ -207,8 +207,8 @@ static void check_places(const char *camera, const char *object, TextureMap map,
             double u, v;
             map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
             for (size_t channel = 0; channel < 3; channel++)
-                largest = fmax(largest, fabs(film.color[3 * i + channel] -
-                                             texture_between(&texture, u, v, wraps, channel)));
+                largest = error_max(largest, fabs(film.color[3 * i + channel] -
+                                                  texture_between(&texture, u, v, wraps, channel)));
             seen++;
         }
         assert_true(seen >= WIDTH * HEIGHT / 4 && seen <= WIDTH * HEIGHT);

@@ -112,7 +112,7 @@ class Tally:
     def record(self, error, bound, where):
         self.count += 1
         self.error = max(self.error, error)
-        if error > bound:
+        if not error <= bound:
             self.wrong += 1
         if not error <= self.part * bound:
             self.part, self.where = error / bound if bound else float("inf"), where
@@ -128,7 +128,7 @@ def render(glint, scene, precision, size, folder):
 
 
 def distance(a, b):
-    return max(abs(float(x) - y) for x, y in zip(a, b))
+    return numpy.max([abs(float(x) - y) for x, y in zip(a, b)])  # keeps NaN, which Python's max may drop
 
 
 def compare(scene, image, rounding, tallies, name):
