@@ -91,7 +91,8 @@ static double value_at(const void *values, size_t i, LayerType type)
 static void layer_assert_same(const Film *film, const Film *expected, Layer layer, const char *what)
 {
     const void *values = film->layers[layer], *wanted = expected->layers[layer];
-    if (!values || !wanted) return;
+    if (!values) return;
+    assert_non_null(wanted);
     const LayerType type = layer_types[layer];
     const size_t components = film_components(film, layer), count = components * film_pixel_count(film);
     size_t differing = 0, first = 0;

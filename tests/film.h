@@ -41,8 +41,8 @@ Film film_cut(const Film *film, uint32_t x, uint32_t y, uint32_t width, uint32_t
 // Returns the color of a film with its columns from right to left.
 Film film_flipped(const Film *film);
 
-// Fails the test, naming the first pixel that differs, unless the layers that both have are equal in value
-// (hence in their bits, except for the sign of a zero). Frees neither.
+// Fails the test, naming the first pixel that differs, unless the film's layers, all of which `expected` must
+// have, are equal in value (hence in their bits, except for the sign of a zero). Frees neither.
 void film_assert_same(const Film *film, const Film *expected, const char *what);
 
 // Returns the number of pixels with a value that is not finite, or a negative color.

@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 import threading
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 from unittest import mock
@@ -146,15 +147,12 @@ class Rays(unittest.TestCase):
         scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         random = np.random.default_rng(1)
         origins, directions = random.normal(size=(20000, 3)) * 3, random.normal(size=(20000, 3))
-        expected, found = scene.trace(origins, directions).object, [None] * 4
+        expected = scene.trace(origins, directions).object
 
         def work(i):
-            found[i] = scene.trace(origins, directions).object if i % 2 else scene.render(64, 48)
-        threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+            return scene.trace(origins, directions).object if i % 2 else scene.render(64, 48)
+        with ThreadPoolExecutor(4) as threads:
+            found = list(threads.map(work, range(4)))
         for i in 1, 3:
             np.testing.assert_array_equal(found[i], expected)
         np.testing.assert_array_equal(found[0], found[2])
@@ -162,7 +160,7 @@ class Rays(unittest.TestCase):
     def test_thread_that_waits_for_a_render(self):
         """A progress function may trace a scene while another thread waits for the device, to open a tracer of that scene."""
         scene, is_rendering, is_opening, open_tracer = glint.Scene(SPHERE), threading.Event(), threading.Event(), glint.Scene._tracer
-        ray = [[0, 0, -4]], [[0, 0, 1]]
+        ray, done = ([[0, 0, -4]], [[0, 0, 1]]), []
 
         def tracer(*arguments):
             is_opening.set()
@@ -173,16 +171,22 @@ class Rays(unittest.TestCase):
             self.assertTrue(is_opening.wait(60))
             scene.trace(*ray)
 
+        def render():
+            scene.render(64, 48, progress=progress)
+            done.append("render")
+
         def trace():
             self.assertTrue(is_rendering.wait(60))
             scene.trace(*ray)
+            done.append("trace")
         with mock.patch.object(glint.Scene, "_tracer", tracer):
-            threads = [threading.Thread(target=target, daemon=True) for target in (lambda: scene.render(64, 48, progress=progress), trace)]
+            threads = [threading.Thread(target=target, daemon=True) for target in (render, trace)]
             for thread in threads:
                 thread.start()
             for thread in threads:
                 thread.join(60)
                 self.assertFalse(thread.is_alive(), "the threads wait for each other")
+        self.assertEqual(sorted(done), ["render", "trace"], "a thread raised an exception")
         self.assertEqual(len(scene._tracers), 1)
 
 
