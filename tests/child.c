@@ -33,8 +33,11 @@ ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
         exit(0);
     }
     int status;
-    if (waitpid(child, &status, 0) == child && WIFEXITED(status)) end.status = WEXITSTATUS(status);
-    if (end.status < 0) end.signal = WTERMSIG(status);
+    if (waitpid(child, &status, 0) != child) fault("no status of a child");
+    if (WIFEXITED(status))
+        end.status = WEXITSTATUS(status);
+    else
+        end.signal = WTERMSIG(status);
     fseek(errors, 0, SEEK_SET);
     end.errors[fread(end.errors, 1, sizeof end.errors - 1, errors)] = '\0';
     fclose(errors);

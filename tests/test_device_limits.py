@@ -39,8 +39,6 @@ WORKS = (
     ("first=4096", TRACE),
     ("buffers=8,first=4096", f"verify S1 {'M1' if IS_LONG else ''} --precision strict --lanes 1"),
 )
-if IS_LONG:
-    WORKS += (("embedded", f"{RENDER} --precision single"),)
 # Limits: warned of, with the same bits. The statuses are CL_OUT_OF_HOST_MEMORY and CL_OUT_OF_RESOURCES.
 INLINED = ("build=6", "kernel=5") if IS_LONG else ("build=6",)
 # Limits, command, exit status, message.

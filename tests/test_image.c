@@ -256,8 +256,7 @@ TEST(disk_full)
     OWNED float *values = values_make(SIDE * SIDE * 3);
     for (size_t i = 0; i < 4; i++) {
         OwnedMessageList messages = {0};
-        ImageHeader header = {image_format_of(endings[i]), SIDE, SIDE, 3, TRANSFER_SRGB, 16, 'f', notes};
-        header.format = (ImageFormat)i;
+        const ImageHeader header = {(ImageFormat)i, SIDE, SIDE, 3, TRANSFER_SRGB, 16, 'f', notes};
         ImageWriter *writer = image_writer_open("/dev/full", &header, &messages);
         if (writer) {
             image_writer_rows(writer, values, SIDE, &messages);

@@ -20,7 +20,7 @@ static bool scene_read(Scene *scene, const char *text, const char *expected)
     text_appendf(&source, "%s", text);
     const bool read = scene_read_text(scene, "scene.yaml", &source, false, &messages);
     for (size_t i = 0; i < messages.count; i++) {
-        text_appendf(&got, "%s:", messages.items[i].file);
+        text_appendf(&got, "%s:", messages.items[i].file ? messages.items[i].file : "");
         message_describe(&got, &messages.items[i]);
     }
     assert_string_equal(text_c(&got), expected);
@@ -450,7 +450,7 @@ TEST(files_have_each_message_once)
         text_appendf(&obj, "word%d\n", i);
         if (i < 18) text_appendf(&expected, "a.obj:%d:1: warning: 'word%d' is not used\n", 8 + i, i);
     }
-    text_appendf(&expected, "(null):warning: scene.yaml: 7 more warnings\n");
+    text_appendf(&expected, ":warning: scene.yaml: 7 more warnings\n");
     file_write("a.mtl", "newmtl red\nKd -1\n");
     file_write("a.obj", text_c(&obj));
     Scene scene;

@@ -89,7 +89,7 @@ class Shape:
     """center, size: for tolerances; radius: of the cross-section whose silhouette a ray may graze."""
 
     def crossings(self, ray):
-        """Returns (t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
+        """Returns t of each crossing of a line, ascending."""
         ts = []
         for t in sorted(self.boundary_ts(ray)):
             if not ts or t - ts[-1] > SAME:
