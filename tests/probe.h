@@ -8,6 +8,7 @@
 #include "host/opencl/compose.h"
 #include "host/render/arithmetic.h"
 #include "host/render/renderer.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -77,13 +78,14 @@ static inline bool probe_has(Precision precision)
            !arithmetic_is_refused(&probe_compute, &settings);
 }
 
-// Skips the test if the device's arithmetic is refused.
+// Skips the test if the device's arithmetic is refused, and fails it if the renderer does not open otherwise.
 static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
 {
     skip_if_refused(&probe_compute, settings);
     OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
+    assert_non_null(renderer);
     return renderer;
 }
 
@@ -138,26 +140,4 @@ static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t
     bool traced = renderer_trace(renderer, rays, count, hits);
     renderer_close(renderer);
     return traced;
-}
-
-static inline bool probe_keep_band(void *context, const Film *band)
-{
-    float *colors = context;
-    memcpy(colors + 3 * (size_t)band->first_row * band->width, band->color,
-           film_layer_size(band, LAYER_COLOR));
-    return true;
-}
-
-// Renders the whole image with one sample per pixel as glint does, by kernels that are built for the
-// features that the scene needs, seen from the eye.
-static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
-                                float *colors)
-{
-    RenderSettings settings = settings_of_image(width, height, precision);
-    settings.shift_to_eye = true;
-    Renderer *renderer = probe_renderer(scene, &settings);
-    if (renderer == NULL) return false;
-    bool whole = renderer_render(renderer, 0, probe_keep_band, colors);
-    renderer_close(renderer);
-    return whole;
 }

@@ -25,7 +25,6 @@ static void trace_lanes(const Scene *scene, Precision precision, BvhChoice bvh, 
     settings.bvh = bvh;
     settings.extra_features = FEATURE_ALL;
     Renderer *renderer = probe_renderer(scene, &settings);
-    assert_non_null(renderer);
     assert_true(renderer_trace(renderer, rays, count, hits));
     assert_int_equal(renderer_report(renderer)->launches.count, 0); // the report is of images
     renderer_close(renderer);

@@ -315,7 +315,6 @@ TEST(a_moved_camera_sees_what_a_new_one_sees)
         settings.moves = true;
         MessageList messages = {0};
         Renderer *renderer = probe_renderer(&scene, &settings);
-        assert_non_null(renderer);
         static const Vector3 places[] = {{3, 2, -5}, {-4, 1, 3}, {0, 6, 0.1}};
         for (size_t i = 0; i < 3; i++) {
             scene.camera.position = places[i];

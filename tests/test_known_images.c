@@ -26,17 +26,19 @@ static Film render(const Scene *scene, uint32_t width, uint32_t height, Precisio
     return film;
 }
 
-// Runs a check at every precision the device has.
-static void at_each_precision(void (*run)(Precision precision))
+typedef void (*Check)(Precision precision);
+
+static void at_precision(Check run, Precision precision)
 {
-    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-        if (!probe_has(precision)) continue;
-        snprintf(place, sizeof place, "%s", precision_names[precision]);
-        run(precision);
-    }
+    snprintf(place, sizeof place, "%s", precision_names[precision]);
+    run(precision);
 }
 
-typedef void (*Check)(Precision precision);
+static void at_each_precision(Check run)
+{
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++)
+        if (probe_has(precision)) at_precision(run, precision);
+}
 
 static void run_at_each_precision(void **state)
 {
@@ -295,9 +297,7 @@ static uint64_t panes_render(bool transparent, Precision precision, uint32_t lan
     settings.extra_features = 0;
     settings.lanes = lanes;
     settings.bounce_count = bounces;
-    MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
-    check(renderer);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     OwnedFilm film;
     check(renderer_render_film(renderer, 0, &film));
     const double expected = (transparent ? 2 * bounces + 1 : bounces + 1) / 512.0;
@@ -324,7 +324,7 @@ TEST(facing_panes)
     if (tests_are_long())
         at_each_precision(depth_of_facing_panes);
     else
-        depth_of_facing_panes(PRECISION_SINGLE);
+        at_precision(depth_of_facing_panes, PRECISION_SINGLE);
 }
 
 // The eye is the origin, so that the same scene 2^23 away has the same bits.

@@ -37,9 +37,7 @@ TEST(passes_give_the_bits_of_one_render)
     settings.sample_count = SAMPLES;
     OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOVS);
     settings.band_rows = 8;
-    MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
-    assert_non_null(renderer);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
     assert_true(renderer_accumulate(renderer, AOVS, take, &taken));
     assert_int_equal(taken.first_samples, 1);
@@ -95,8 +93,7 @@ TEST(passes_stop)
     settings.sample_count = SAMPLES;
     settings.band_rows = 8;
     settings.stop = stop_now;
-    MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     for (unsigned launches = 0; launches < 9; launches++) {
         Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
         stop_countdown = launches;
@@ -124,7 +121,7 @@ static void check_moved_renderer(bool moves)
     settings.moves = moves;
     settings.bvh = BVH_ON;
     MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     OwnedFilm first;
     assert_true(renderer_render_film(renderer, AOVS, &first)); // its kernels take the new arrays
     double build_seconds = renderer_report(renderer)->build_seconds;
@@ -154,7 +151,7 @@ static void check_moved_renderer(bool moves)
 // At `certified`, a scene that does not fit the device in double must not replace the scene in float.
 TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
 {
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     Device small = *probe_compute.device;
     Compute compute = probe_compute;
     compute.device = &small;
@@ -162,6 +159,7 @@ TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
     const RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
     OwnedMessageList messages = {0};
     Renderer *renderer = renderer_open(&compute, &scene, &settings, &messages);
+    assert_non_null(renderer);
     OwnedFilm expected = film_render(&compute, &scene, &settings, AOVS);
     small.memory_bytes = 1 << 28;
     while (renderer_move(renderer, &scene, &settings, &messages))
@@ -187,7 +185,7 @@ static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
     settings.moves = true;
     settings.bvh = bvh;
     MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     const Camera camera = scene.camera;
     const Vector3 ahead = vector_subtract(camera.look_at, camera.position);
     scene.camera.position = vector_add(camera.position, vector_scale(ahead, fraction_of_way));
@@ -238,7 +236,7 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
     settings.extra_features = 0;
     settings.moves = true;
     MessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+    Renderer *renderer = probe_renderer(&scene, &settings);
     uint64_t hashes[4];
     double build_seconds[4];
     for (size_t i = 0; i < 4; i++) {
