@@ -15,26 +15,11 @@ typedef struct {
     uint64_t rerendered, uncertified;
 } Answer;
 
-// Renderers at each precision. Their kernels serve scene after scene.
-static Renderer *painters[PRECISION_COUNT];
-
 static inline Film image_render(const Scene *scene, const RenderSettings *settings)
 {
-    Renderer **painter = &painters[settings->precision];
-    OwnedMessageList messages = {0};
-    *painter = renderer_reopen(*painter, &probe_compute, scene, settings, &messages);
-    message_list_print(&messages, stderr);
-    assert_non_null(*painter);
     Film film;
-    assert_true(renderer_render_film(*painter, AOVS, &film));
+    assert_true(renderer_render_film(probe_shared_renderer(scene, settings), AOVS, &film));
     return film;
-}
-
-static inline int painters_close(void **state)
-{
-    for (size_t i = 0; i < PRECISION_COUNT; i++)
-        renderer_close(painters[i]);
-    return probe_close(state);
 }
 
 static inline Answer answer(const Scene *scene, const CertifySample *reference,

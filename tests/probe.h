@@ -16,6 +16,8 @@
 
 static DeviceList probe_devices;
 static Compute probe_compute;
+// The renderers of probe_shared_renderer by precision and lanes.
+static Renderer *probe_renderers[PRECISION_COUNT][LANES_MAX + 1];
 
 // cmocka's group setup and teardown. The teardown fails if a call of OpenCL failed.
 static inline int probe_open(void **state)
@@ -37,6 +39,8 @@ static inline int probe_close(void **state)
         OWNED char *failure = compute_failure_text(&probe_compute);
         fprintf(stderr, "%s\n", failure);
     }
+    for (size_t i = 0; i < PRECISION_COUNT * (LANES_MAX + 1); i++)
+        renderer_close(probe_renderers[i / (LANES_MAX + 1)][i % (LANES_MAX + 1)]);
     compute_close(&probe_compute);
     device_list_close(&probe_devices);
     return ok ? 0 : -1;
@@ -78,15 +82,30 @@ static inline bool probe_has(Precision precision)
            !arithmetic_is_refused(&probe_compute, &settings);
 }
 
-// Skips the test if the device's arithmetic is refused, and fails it if the renderer does not open otherwise.
-static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
+// Opens a renderer as renderer_reopen does. Skips the test if the device's arithmetic is refused, and fails
+// it if the renderer does not open otherwise.
+static inline Renderer *probe_reopen(Renderer *earlier, const Scene *scene, const RenderSettings *settings)
 {
     skip_if_refused(&probe_compute, settings);
     OwnedMessageList messages = {0};
-    Renderer *renderer = renderer_open(&probe_compute, scene, settings, &messages);
+    Renderer *renderer = renderer_reopen(earlier, &probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
     assert_non_null(renderer);
     return renderer;
+}
+
+static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
+{
+    return probe_reopen(NULL, scene, settings);
+}
+
+// Returns a renderer that probe_close, or the next call with the precision and lanes, closes. Its kernels
+// serve scene after scene.
+static inline Renderer *probe_shared_renderer(const Scene *scene, const RenderSettings *settings)
+{
+    Renderer **shared = &probe_renderers[settings->precision][settings->lanes], *earlier = *shared;
+    *shared = NULL;
+    return *shared = probe_reopen(earlier, scene, settings);
 }
 
 // Builds a program of the test's kernels, which may include the shipped ones, with every feature. Unless the
@@ -127,17 +146,13 @@ static inline cl_kernel probe_kernel(cl_program program, const char *name)
     return kernel;
 }
 
-// Finds closest hits with every feature built in, so that one program serves all scenes. Returns false, after
-// printing the reason, if the device cannot.
+// Finds closest hits with every feature built in, so that one program serves all scenes. Returns false if the
+// device cannot.
 static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const TraceRay *rays,
                                size_t count, TraceHit *hits)
 {
     RenderSettings settings = settings_of_image(1, 1, precision);
     settings.lanes = lanes;
     settings.extra_features = FEATURE_ALL;
-    Renderer *renderer = probe_renderer(scene, &settings);
-    if (renderer == NULL) return false;
-    bool traced = renderer_trace(renderer, rays, count, hits);
-    renderer_close(renderer);
-    return traced;
+    return renderer_trace(probe_shared_renderer(scene, &settings), rays, count, hits);
 }

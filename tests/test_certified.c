@@ -553,4 +553,4 @@ TEST(smooth_meshes_are_decided)
     assert_true(uncertified * 200 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
-TEST_MAIN(probe_open, painters_close)
+TEST_MAIN(probe_open, probe_close)

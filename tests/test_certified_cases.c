@@ -350,4 +350,4 @@ TEST(planets_of_every_scale_are_decided)
     assert_int_equal(uncertified, 0);
 }
 
-TEST_MAIN(probe_open, painters_close)
+TEST_MAIN(probe_open, probe_close)
