@@ -23,12 +23,17 @@ const uint32_t *tested_lanes(const Device *device)
     return lanes;
 }
 
+FeatureSet film_features(Precision precision)
+{
+    if (tests_are_long()) return 0;
+    return precision == PRECISION_CERTIFIED ? CERTIFIED_FEATURES : FEATURE_ALL;
+}
+
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)
 {
     RenderSettings settings = settings_of_image(width, height, precision);
     settings.bounce_count = 5;
-    if (!tests_are_long())
-        settings.extra_features = precision == PRECISION_CERTIFIED ? CERTIFIED_FEATURES : FEATURE_ALL;
+    settings.extra_features = film_features(precision);
     settings.shift_to_eye = true;
     return settings;
 }

@@ -20,9 +20,12 @@ const uint32_t *tested_lanes(const Device *device);
      FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
      FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
 
+// Returns the features that tests build in beyond a scene's, so that all tests of a run share one program per
+// precision: all, CERTIFIED_FEATURES at certified, and none in long tests.
+FeatureSet film_features(Precision precision);
+
 // Returns settings for the whole image, one sample per pixel, with the defaults of glint render except for
-// the features. Unless tests are long, all are built in, or CERTIFIED_FEATURES at certified, so that all
-// tests of a run share one program per precision.
+// film_features.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
 // Returns true, after printing the reason, if a passport of the device's arithmetic refuses the precision of

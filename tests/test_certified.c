@@ -309,7 +309,7 @@ static const double rerendered_max[FAMILY_COUNT] = {0.7, 0.25, 0.25, 0.65, 0.24}
 static void check_family(Family family)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
-    const unsigned scene_count = tests_are_long() ? 70 : 3;
+    const unsigned scene_count = tests_are_long() ? 70 : 3, run_count = tests_are_long() ? 3 : 2;
     size_t single_wrong = 0, compared = 0;
     uint64_t rerendered = 0, uncertified = 0;
     for (unsigned seed = 0; seed < scene_count; seed++) {
@@ -321,11 +321,10 @@ static void check_family(Family family)
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
-        if (!tests_are_long()) settings.extra_features = CERTIFIED_FEATURES;
-        for (unsigned run = 0; run < 3; run++) {
+        if (!tests_are_long()) settings.extra_features = film_features(PRECISION_CERTIFIED);
+        for (unsigned run = 0; run < run_count; run++) {
             settings.bvh = run == 1 ? BVH_OFF : BVH_ON;
             settings.perturb_seed = run == 2 ? 1 + seed % PERTURB_SEEDS : 0;
-            if (run == 2 && !tests_are_long()) continue;
             const Answer certified = answer(&scene, &reference, &settings);
             if (certified.wrong_decided > 0)
                 fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not uncertified",
@@ -335,8 +334,7 @@ static void check_family(Family family)
         }
         compared += reference.count;
     }
-    const double samples = (double)(compared * (tests_are_long() ? 3 : 2)),
-                 rerendered_share = (double)rerendered / samples,
+    const double samples = (double)(compared * run_count), rerendered_share = (double)rerendered / samples,
                  uncertified_share = (double)uncertified / samples;
     print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f re-rendered, %.5f "
                   "uncertified\n",

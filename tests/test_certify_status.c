@@ -50,7 +50,7 @@ Renderer *__wrap_renderer_open(Compute *compute, const Scene *scene, const Rende
         changed.materials.items[i].checker.size *= 1.5;
     changed.objects.count -= wrong.change == A_SHADOW; // the last is the disc
     RenderSettings shared = *settings;
-    shared.extra_features = CERTIFIED_FEATURES; // of other tests' programs
+    shared.extra_features = film_features(settings->precision);
     return __real_renderer_open(compute, &changed, &shared, messages);
 }
 
