@@ -1,12 +1,10 @@
 #include "tests/child.h"
+#include "tests/check.h"
 
+#include "host/base/exit_status.h"
 #include "host/base/fault.h"
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 // Exits without a leak check, since a fault leaves its memory to the system and must keep its status.
 static void leave(int status, void *unused)
@@ -44,4 +42,16 @@ ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
     memcpy(result, shared, size);
     munmap(shared, size);
     return end;
+}
+
+unsigned failures_without_memory(void (*work)(void *left))
+{
+    long left = 0;
+    unsigned failed = 0;
+    for (ChildEnd end; (end = child_run(work, &left, sizeof left)).status != 0; left = ++failed) {
+        assert_int_equal(end.status, EXIT_MACHINE);
+        assert_non_null(strstr(end.errors, "out of memory"));
+    }
+    assert_true(left >= 0); // none failed unseen
+    return failed;
 }

@@ -11,3 +11,8 @@ typedef struct {
 
 // Runs `work` on a copy of `result` and copies back what it left there.
 ChildEnd child_run(void (*work)(void *result), void *result, size_t size);
+
+// Runs work in children, in which the first allocation fails, then the second, and so on until all succeed,
+// and checks that each failure is reported. Returns the number of failures. `left` is the number of
+// allocations that succeed, from which the work subtracts its own.
+unsigned failures_without_memory(void (*work)(void *left));
