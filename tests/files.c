@@ -6,7 +6,7 @@
 #include <ftw.h>
 #include <sys/stat.h>
 
-static char *folder_make(void)
+char *folder_make(void)
 {
     char folder[] = "/tmp/glint-test-XXXXXX";
     if (!mkdtemp(folder)) fault("no folder for a test");
@@ -19,7 +19,7 @@ static int remove_one(const char *path, const struct stat *status, int type, str
     return remove(path);
 }
 
-static void folder_remove(char *folder)
+void folder_remove(char *folder)
 {
     nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
     free(folder);

@@ -5,6 +5,10 @@
 #include <stddef.h>
 #include <sys/types.h>
 
+// Creates an empty folder below /tmp, which folder_remove removes with its contents.
+char *folder_make(void);
+void folder_remove(char *folder);
+
 // cmocka's group setup and teardown. The working folder is a new one, which is removed with its contents. The
 // teardown fails if glint has left a temporary file.
 int folder_open(void **state);

@@ -153,8 +153,7 @@ TEST(crashes)
     static const char *const calls[] = {"clGetPlatformIDs", "clBuildProgram", "clWaitForEvents",
                                         "clGetProgramInfo"};
     static const int crashes[] = {SIGSEGV, SIGABRT, FAILED_ASSERTION};
-    char folder[] = "/tmp/glint-test-XXXXXX";
-    assert_non_null(mkdtemp(folder));
+    char *folder = folder_make();
     crash_folder = folder; // an empty cache: no program comes from it
     for (size_t i = 0; i < COUNT_OF(calls); i++)
         for (size_t k = 0; k < COUNT_OF(crashes); k++) {
@@ -176,7 +175,7 @@ TEST(crashes)
             unlink(path);
         }
     crash = 0;
-    scratch_close(memory_copy_text(folder));
+    folder_remove(folder);
 #endif
 }
 

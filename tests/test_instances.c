@@ -12,7 +12,7 @@
 enum { WIDTH = 83, HEIGHT = 47, SIDE = 24, TRIANGLES = 2 * SIDE * SIDE };
 
 // A plain folder, not scratch_open's, since compiled kernels are in the run's cache.
-static char folder[] = "/tmp/glint-test-XXXXXX";
+static char *folder;
 
 // Writes a bumpy ball with texture coordinates, and normals if it is smooth.
 static void ball_write(const char *name, bool is_smooth)
@@ -43,7 +43,7 @@ static void ball_write(const char *name, bool is_smooth)
 
 static int instances_open(void **state)
 {
-    assert_non_null(mkdtemp(folder));
+    folder = folder_make();
     ball_write("smooth.obj", true);
     ball_write("flat.obj", false);
     return probe_open(state);
@@ -51,10 +51,7 @@ static int instances_open(void **state)
 
 static int instances_close(void **state)
 {
-    static const char *const names[] = {"smooth.obj", "flat.obj", ""};
-    for (int i = 0; i < 3; i++) {
-        remove(formatted("%s/%s", folder, names[i]));
-    }
+    folder_remove(folder);
     return probe_close(state);
 }
 

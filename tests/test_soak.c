@@ -6,6 +6,7 @@
 #include "host/scene/mesh.h"
 #include "tests/check.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include "tests/probe.h"
 #include "tests/random_scene.h"
 #include <malloc.h>
@@ -245,24 +246,22 @@ TEST(memory_and_images_stay)
     assert_true(all.bytes_twice <= all.bytes_once + BYTES_KEPT_MAX);
 }
 
-static char folder[] = "/tmp/glint-soak-XXXXXX";
+static char *folder;
 
 static int image_open(void **state)
 {
     (void)state;
-    if (!mkdtemp(folder)) return -1;
+    folder = folder_make();
     snprintf(image_path, sizeof image_path, "%s/a.ppm", folder);
-    FILE *file = fopen(image_path, "w");
-    return file && fputs("P3 3 2 255 255 0 0 0 255 0 0 0 255 9 9 9 200 200 200 90 50 10\n", file) >= 0 &&
-                   fclose(file) == 0
-               ? 0
-               : -1;
+    file_write(image_path, "P3 3 2 255 255 0 0 0 255 0 0 0 255 9 9 9 200 200 200 90 50 10\n");
+    return 0;
 }
 
 static int image_close(void **state)
 {
     (void)state;
-    return unlink(image_path) == 0 && rmdir(folder) == 0 ? 0 : -1;
+    folder_remove(folder);
+    return 0;
 }
 
 TEST_MAIN(image_open, image_close)

@@ -7,20 +7,19 @@
 #include "tests/scene_reading.h"
 #include <turbojpeg.h>
 
-static char folder[] = "/tmp/glint-textures-XXXXXX";
+static char *folder;
 static char texture_path[64];
 
 static int textures_open(void **state)
 {
-    if (!mkdtemp(folder)) return -1;
+    folder = folder_make();
     snprintf(texture_path, sizeof texture_path, "%s/texture.npy", folder);
     return probe_open(state);
 }
 
 static int textures_close(void **state)
 {
-    unlink(texture_path);
-    rmdir(folder);
+    folder_remove(folder);
     return probe_close(state);
 }
 
@@ -476,10 +475,7 @@ TEST(jpeg_is_read)
     tjhandle encoder = tjInitCompress();
     assert_int_equal(
         tjCompress2(encoder, pixels, SIDE, 0, SIDE, TJPF_RGB, &bytes, &length, TJSAMP_420, 95, 0), 0);
-    FILE *file = fopen(texture_path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    fclose(file);
+    file_write_bytes(texture_path, bytes, length);
     Image image;
     OwnedMessageList messages = {0};
     assert_true(image_read(&image, texture_path, NULL, &messages));
