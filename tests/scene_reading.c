@@ -152,9 +152,7 @@ void check_near(double value, double expected, double tolerance, const char *fil
 
 void check_number(double value, double expected, const char *file, int line)
 {
-    if (fabs(value - expected) <= 1e-14 * fmax(1, fabs(expected))) return;
-    print_error("%.17g, not %.17g\n", value, expected);
-    _fail(file, line);
+    check_near(value, expected, 1e-14 * fmax(1, fabs(expected)), file, line);
 }
 
 void check_vector(Vector3 vector, Vector3 expected, const char *file, int line)

@@ -257,7 +257,6 @@ TEST(rows_of_one_process)
     }
 }
 
-// The ends are the order statistics that the binomial distribution gives, worked out by hand.
 TEST(rows)
 {
     static const struct {
@@ -278,6 +277,7 @@ TEST(rows)
         assert_int_equal(verdict_of_row(rows[i].frame, rows[i].processor), rows[i].row);
 }
 
+// The ends are the order statistics that the binomial distribution gives, worked out by hand.
 TEST(intervals)
 {
     // 2 / 2^9 <= 0.01 / 2 < 2 / 2^8, and each further look takes twice as many

@@ -93,7 +93,7 @@ TEST(dispensable_calls)
     assert_work_is_right();
 }
 
-// A build without a log says so, and names the disk where it is full.
+// A message about a build without a log states so, and names the disk if it is full.
 TEST(empty_build_log)
 {
     for (int full = 0; full < 2; full++) {
@@ -137,32 +137,34 @@ TEST(builds)
         unsetenv("XDG_CACHE_HOME");
 }
 
-// The list says which call failed first, and so does the message where no device is left.
+// Lists the devices and chooses one. The list names the call that failed first, and so does the message if no
+// device is left.
+static void devices_discover(const char *failed_call)
+{
+    call_counts_clear();
+    DeviceList list;
+    OwnedMessageList messages = {0};
+    device_list_open(&list, NULL);
+    const Device *chosen = device_choose(&list, NULL, &messages);
+    assert_int_equal(messages.count, chosen == NULL);
+    if (failed_call) assert_string_equal(list.failed_call, failed_call);
+    if (messages.count > 0)
+        assert_non_null(
+            strstr(messages.items[0].text, formatted("(%s: CL_OUT_OF_RESOURCES (-5))", failed_call)));
+    device_list_close(&list);
+}
+
 TEST(discovery)
 {
     static const char *const queries[] = {"clGetPlatformIDs", "clGetPlatformInfo", "clGetDeviceIDs",
                                           "clGetDeviceInfo"};
     for (size_t i = 0; i < COUNT_OF(queries); i++) {
         injected.call = NULL;
-        for (size_t index = 0, count = 1; index < count; index++) {
-            call_counts_clear();
-            DeviceList list;
-            OwnedMessageList messages = {0};
-            device_list_open(&list, NULL);
-            const Device *chosen = device_choose(&list, NULL, &messages);
-            assert_int_equal(messages.count, chosen == NULL);
-            if (injected.call) assert_string_equal(list.failed_call, queries[i]);
-            if (messages.count > 0) {
-                assert_non_null(
-                    strstr(messages.items[0].text, formatted("(%s: CL_OUT_OF_RESOURCES (-5))", queries[i])));
-            }
-            device_list_close(&list);
-            if (!injected.call) {
-                count = call_count(queries[i])->count + 1;
-                injected.call = queries[i];
-            }
-            injected.index = index;
-        }
+        devices_discover(NULL);
+        const size_t count = call_count(queries[i])->count;
+        injected.call = queries[i];
+        for (injected.index = 0; injected.index < count; injected.index++)
+            devices_discover(queries[i]);
     }
     injected.call = NULL;
 }

@@ -1,5 +1,6 @@
 // Feeds randomly damaged files to the readers of tests/fuzz/readers.c in a sanitized build. tools/fuzz
-// generates inputs guided by coverage. run_tests: sanitized
+// generates inputs guided by coverage.
+// run_tests: sanitized
 #include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/child.h"

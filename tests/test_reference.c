@@ -7,8 +7,7 @@
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
 
-#define MISS         NAN
-#define COUNT(array) (sizeof(array) / sizeof *(array))
+#define MISS NAN
 
 typedef struct {
     const char *name;
@@ -83,7 +82,7 @@ TEST(knows_spheres)
         {"on it", unit, {0, 0, 1}, z, MISS},
         {"behind", unit, {0, 0, 5}, z, MISS},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 TEST(sees_only_insides)
@@ -99,7 +98,7 @@ TEST(sees_only_insides)
         {"tube", tube, {0, 0, 0}, x, 1},    {"tube", tube, {-5, 0, 2}, x, MISS},
         {"cup", cup, {-5, 0, 1}, x, 5.75},  {"cup", cup, {0, 0, 1}, x, 0.75},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 TEST(knows_flat_shapes)
@@ -128,7 +127,7 @@ TEST(knows_flat_shapes)
         {"triangle", triangle(0x1p40), {0x1p40 / 3, 0x1p40 / 3, -0x1p40}, z, 0x1p40},
         {"triangle", triangle(1), {0.5, 0.51, -1}, z, MISS},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 TEST(knows_cylinders)
@@ -155,7 +154,7 @@ TEST(knows_cylinders)
         {"tangent", infinite, {-1e3, 1.00001, 0}, x, MISS},
         {"tangent", infinite, {-1e5, 0.99, 0}, x, 99999.858932707},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 TEST(knows_cones)
@@ -180,7 +179,7 @@ TEST(knows_cones)
         {"cup", cup, {0.75, 0, 5}, {0, 0, -1}, 4},
         {"through the cup", cup, {0.25, 0, 5}, {0, 0, -1}, MISS},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 // The numbers are those of interval arithmetic.
@@ -213,7 +212,7 @@ TEST(knows_tori)
         {"spindle", spindle, {-1, 0, 1.875}, x, 0.6959705453537527},
         {"spindle", spindle, {-0.125, 0, 1.875}, x, 0.4290294546462473},
     };
-    check(known, COUNT(known));
+    check(known, COUNT_OF(known));
 }
 
 static Scene one_object(Object *object, Material *material, Light *lights, size_t light_count)
@@ -277,7 +276,7 @@ TEST(casts_shadows)
     Material material = {.diffuse = {1, 1, 1}, .color = {1, 1, 1}};
     Light light = {.type = LIGHT_POINT, .color = {1, 1, 1}, .position = {0, 10, 0}};
     Scene scene = one_object(objects, &material, &light, 1);
-    scene.objects.count = COUNT(objects);
+    scene.objects.count = COUNT_OF(objects);
     const double edge = 10 / sqrt(80);
     for (int side = -1; side <= 1; side += 2) {
         double x = edge * (1 + side * 1e-9);
@@ -378,7 +377,7 @@ TEST(rounds_every_number)
     object = reference_round_object(&object);
     const double numbers[] = {object.as.box.min.x, object.as.box.min.y, object.as.box.min.z,
                               object.as.box.max.x, object.as.box.max.y, object.as.box.max.z};
-    for (size_t i = 0; i < COUNT(numbers); i++)
+    for (size_t i = 0; i < COUNT_OF(numbers); i++)
         assert_near(numbers[i], rounded, 0);
     object = frustum(1.0 / 3, 1.0 / 3, true);
     object.as.cone.from = object.as.cone.axis = third;
@@ -392,7 +391,7 @@ TEST(finds_the_nearest)
     Object objects[] = {sphere((Vector3){0, 0, 9}, 1), sphere((Vector3){0, 0, 5}, 1),
                         sphere((Vector3){0, 0, 6}, 2)};
     Scene scene = one_object(objects, NULL, NULL, 0);
-    scene.objects.count = COUNT(objects);
+    scene.objects.count = COUNT_OF(objects);
     ReferenceRay ray = reference_ray((Vector3){0, 0, 0}, (Vector3){0, 0, 1});
     ReferenceHit hit = reference_hit(&scene, &ray);
     assert_int_equal(hit.object, 1);
@@ -473,8 +472,8 @@ TEST(knows_highlights)
 {
     const Quad3 normal = {0, 0, 1}, to_eye = {0, 0, 1};
     const double exponents[] = {0, 1, 10, 1e3, 1e6}, angles[] = {0, 1e-4, 1e-3, 0.1, 1};
-    for (size_t i = 0; i < COUNT(exponents); i++)
-        for (size_t k = 0; k < COUNT(angles); k++) {
+    for (size_t i = 0; i < COUNT_OF(exponents); i++)
+        for (size_t k = 0; k < COUNT_OF(angles); k++) {
             // the light mirrored lies at its own angle with the eye
             Quad3 to_light = {sinl(angles[k]), 0, cosl(angles[k])};
             double versine = 2 * sin(angles[k] / 2) * sin(angles[k] / 2);
@@ -490,7 +489,7 @@ TEST(nonfinite_colors_are_errors)
 {
     uint32_t places[3][2] = {{0, 0}, {1, 0}, {2, 0}}, objects[3] = {0}, paths[3] = {0}, flags[3] = {0};
     ReferencePixel pixels[3];
-    for (size_t i = 0; i < COUNT(pixels); i++)
+    for (size_t i = 0; i < COUNT_OF(pixels); i++)
         pixels[i] = (ReferencePixel){.color = {0.5, 0.25, 0.125}, .margin = 1};
     double colors[9] = {0.5, 0.25, 0.25, 0.5, 0.25, 0.125, 0.5, 0.25, 0.125};
     CertifySample sample = {.width = 3, .height = 1, .count = 1, .places = places, .pixels = pixels};
