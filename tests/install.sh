@@ -2,8 +2,6 @@
 # Tests make install and uninstall: files go where the variables say and nowhere else, and the installed programs work. The
 # user's flags reach every command of a build, and neither flags nor folders are compiled in. Archives by git know their commit.
 . "$(dirname "$0")/support.bash"
-make=${MAKE:-make}
-build=${BUILD:-build}
 version=$(sed -n 's/^VERSION := //p' Makefile)
 
 # AppStream 1.0 asks for a homepage, which glint does not have. Version 0.16 does not know the name of that question.

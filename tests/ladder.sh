@@ -3,8 +3,6 @@
 # cases at every precision (tools/numerics/ladder.c).
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all "the plain build measures the same kernels"
-build=${BUILD:-build}
-make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
 rays=250
 if is_long; then

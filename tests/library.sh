@@ -3,18 +3,18 @@
 # Tests libglint as a C program finds it: installed, with nothing else of the tree. The example builds against the shared and the
 # static library, as C and as C++, and both have the symbols of glint.h alone.
 . "$(dirname "$0")/support.bash"
-case $BUILD in *-sanitize) echo "the example has no sanitizer's runtime"; exit 77 ;; esac
-make=${MAKE:-make}
+is_sanitized && skip_all "the example has no sanitizer's runtime"
 
 stage=$scratch/stage
-check "make install-library" $make -s BUILD="$BUILD" PREFIX="$stage" DOCDIR="$stage/doc" install-library
-check "the header declares what symbols lists" diff <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort) \
+check "make install-library" $make -s BUILD="$build" PREFIX="$stage" DOCDIR="$stage/doc" install-library
+listed() { sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort; }
+check "the header declares what symbols lists" diff <(listed) \
     <(grep -o 'glint_[a-z_]*(' "$stage/include/glint.h" | tr -d '(' | sort -u)
 exported() { nm "$@" | sed -n 's/.* T \(.*\)/\1/p' | sed 's/@.*//' | sort; }
 check "the shared library exports these alone" diff <(exported -D --defined-only "$stage/lib/libglint.so") \
-    <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
+    <(listed)
 check "the static library exports the same" diff <(nm -g --defined-only "$stage/lib/libglint.a" | sed -n 's/.* [A-Z] //p' | sort) \
-    <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
+    <(listed)
 
 # Only crash handling, exit() and constants that are computed once need process-wide variables. Only faults print.
 check "libglint has no other process-wide variables" diff <(nm "$stage/lib/libglint.a" | sed -n 's/.* [bB] \([a-z_0-9]*\).*/\1/p' | sort -u) \
@@ -27,8 +27,8 @@ cp scenes/article.yaml "$scratch/scene.yaml"
 cd "$stage/doc/docs"
 export PKG_CONFIG_PATH=$stage/lib/pkgconfig LD_LIBRARY_PATH=$stage/lib
 flags="-Wall -Wextra -Werror"
-check "the example compiles" cc -std=c11 $flags example.c $(pkg-config --cflags --libs glint) -lm -o "$scratch/shared"
-check "it compiles with the static library" cc -std=c11 $flags example.c $(pkg-config --cflags glint) "$stage/lib/libglint.a" \
+check "the example compiles" ${CC:-cc} -std=c11 $flags example.c $(pkg-config --cflags --libs glint) -lm -o "$scratch/shared"
+check "it compiles with the static library" ${CC:-cc} -std=c11 $flags example.c $(pkg-config --cflags glint) "$stage/lib/libglint.a" \
     $(pkg-config --libs --static glint | sed 's/-lglint//') -lm -o "$scratch/static"
 ! command -v c++ >/dev/null || check "the header compiles as C++" c++ -x c++ -fsyntax-only $flags -include "$stage/include/glint.h" /dev/null
 cd "$scratch"

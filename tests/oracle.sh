@@ -3,10 +3,9 @@
 # rays of the hard cases and random ones at every shape, ten times as many with GLINT_LONG_TESTS=1. Needs python-flint, from
 # PyPI. It runs for the first build only, since the plain build computes the same.
 . "$(dirname "$0")/support.bash"
-build=${BUILD:-build}
 
 python_with flint=python-flint==0.9.0
-check 'the program that prints answers builds' ${MAKE:-make} -s BUILD="$build" "$build/tests/oracle/answers"
+check 'the program that prints answers builds' $make -s BUILD="$build" "$build/tests/oracle/answers"
 long= samples=24
 ! is_long || long=--long samples=240
 "$build/tests/oracle/answers" $samples >"$scratch/answers" || fail 'answers are printed'

@@ -7,7 +7,7 @@
 python_with flint=python-flint==0.9.0 yaml=PyYAML==6.0.3 numpy=numpy==2.4.6
 long=
 ! is_long || long=--long
-if "$python" -B tests/oracle/images.py "${BUILD:-build}/glint" "$scratch" $long; then
+if "$python" -B tests/oracle/images.py "$build/glint" "$scratch" $long; then
     pass
 else
     fail "images are what the oracle says"

@@ -7,8 +7,7 @@ is_long || skip_all "only with GLINT_LONG_TESTS=1"
 is_sanitized && skip_all "Embree is not built with sanitizers"
 [ -f /usr/include/embree3/rtcore.h ] || skip_all "there is no Embree (libembree-dev)"
 python_with yaml=PyYAML==6.0.3
-build=$(dirname "$GLINT")
-${MAKE:-make} -s BUILD="$build" "$build/peers/embree" >"$scratch/make.log" 2>&1 || { cat "$scratch/make.log"; exit 1; }
+$make -s BUILD="$build" "$build/peers/embree" >"$scratch/make.log" 2>&1 || { cat "$scratch/make.log"; exit 1; }
 
 bench() { # EMBREE RUNG…
     "$python" tools/peers/bench --glint "$GLINT" --scenes "$scratch/scenes" --rounds 1 --seconds 0.02 --size 240x136 \
