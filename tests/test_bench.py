@@ -11,22 +11,10 @@ import shutil
 import statistics
 import unittest
 
-from glint import IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, write
+from glint import IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, read, run, shim_build, write
 
 QUICK = "--size 32x24 --seconds 0.1"
 TINY = "--size 32x24 --no-build-times"
-# Launches fail from the one of number FAILING on.
-FAILING = """
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <stdlib.h>
-int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
-{
-    static int count;
-    if (count++ >= atoi(getenv("FAILING"))) return -5;
-    return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
-}
-"""
 # NVIDIA's library, with one board, whose counter grows alike.
 NVML = """
 #include <stdlib.h>
@@ -300,7 +288,7 @@ for line in worker.stdout:
         os.mkdir("nvml")
         shim_build("nvml/libnvidia-ml.so.1", NVML)
         limits = shim_build("limits.so", read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
-        board = {"OCL_ICD_VENDORS": find_icd("pocl"), "LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
+        board = POCL | {"LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
         nvml = board | {"LD_LIBRARY_PATH": os.path.abspath("nvml")}
         self.check_energy("NVML", 1001, nvml)
         # readings of 50 ms: a second of frames between two, at least three of them
@@ -314,10 +302,10 @@ for line in worker.stdout:
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_variant(self):
         """The call of a variant with options for the driver is named, as it is opened and in its many runs."""
-        failing = shim_build("failing.so", FAILING)
+        limits = shim_build("limits.so", read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
         for count in 0, 60:
             process = self.glint(f"bench sphere.yaml {TINY} --seconds 60 --variant '--work-group 4x2'", 2,
-                                 env={"LD_PRELOAD": failing, "FAILING": str(count)})
+                                 env={"LD_PRELOAD": limits, "GLINT_LIMITS": f"fail={count}"})
             self.assertRegex(process.stderr, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
             self.assertEqual(process.stdout, "")
 

@@ -18,6 +18,7 @@
 //   khr, nv, amd   the extensions of that vendor that tell devices of one name apart
 //   first=N        the watchdog: a kernel's launch fails if it has more than N work-items, and more than four
 //                  times those of its last launch
+//   fail=N         launches fail after the first N
 #define CL_TARGET_OPENCL_VERSION 120
 #define _GNU_SOURCE
 #include <CL/cl.h>
@@ -298,13 +299,15 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
     pthread_mutex_lock(&mutex);
     const size_t place = kernel_find(kernel);
     size_t *last = &kernels[place].last_items;
+    static cl_ulong launches;
+    const bool fails = limit_get("fail", &most) && launches++ >= most;
     const bool is_too_long = limit_get("first", &most) && items > most && items > 4 * *last;
     *last = items;
     for (size_t i = 0; i < ARGUMENTS_MAX; i++)
         buffer_count += kernels[place].is_buffer[i];
     pthread_mutex_unlock(&mutex);
     if (limit_get("buffers", &most) && buffer_count > most) return CL_OUT_OF_RESOURCES;
-    if (is_too_long) return CL_OUT_OF_RESOURCES;
+    if (fails || is_too_long) return CL_OUT_OF_RESOURCES;
     return NEXT(clEnqueueNDRangeKernel)(queue, kernel, dimensions, first, global, local, wait_count, wait,
                                         event);
 }
