@@ -63,7 +63,7 @@ class Formats(TestCase):
             self.reports[command] = self.json(f"{command} --json")
         return rows_of(self.reports[command], path)
 
-    def both(self, command, form):
+    def written(self, command, form):
         """Returns the report in a format, by --output."""
         self.glint(f"{command} --format {form} --output report")
         return read("report")
@@ -81,7 +81,7 @@ class Formats(TestCase):
         for name, (command, path, _, members) in COMMANDS.items():
             with self.subTest(name):
                 rows = self.rows(command, path)
-                found = list(csv.DictReader(io.StringIO(self.both(command, "csv"))))
+                found = list(csv.DictReader(io.StringIO(self.written(command, "csv"))))
                 self.assertEqual(len(found), len(rows))
                 for cells, row in zip(found, rows):
                     self.agrees(cells, row, members)
@@ -100,7 +100,7 @@ class Formats(TestCase):
         for name, (command, path, named, _) in COMMANDS.items():
             with self.subTest(name):
                 rows = self.rows(command, path)
-                (suite,) = ElementTree.fromstring(self.both(command, "junit"))
+                (suite,) = ElementTree.fromstring(self.written(command, "junit"))
                 self.assertEqual((suite.get("name"), suite.get("tests"), suite.get("failures")), (f"glint {name}", str(len(rows)), "0"))
                 self.assertEqual([case.get("classname") for case in suite], [f"glint.{name}"] * len(rows))
                 self.assertEqual(len({case.get("name") for case in suite}), len(rows), "names are unique")

@@ -137,7 +137,7 @@ TEST(percentile)
     assert_near(error_summarize(expected, found, COUNT).largest, 5000e-6, 1e-9);
 }
 
-TEST(kinds_that_do_not_compare)
+TEST(images_that_do_not_compare)
 {
     float value[3] = {0};
     Image image = {.width = 1, .height = 1, .channels = 3, .values = value}, other = image;

@@ -12,21 +12,21 @@ typedef struct {
     uint32_t samples; // of the last band of color
     uint32_t first_samples;
     unsigned color_bands, aov_bands;
-} Taken;
+} Received;
 
-static bool take(void *context, const Film *band)
+static bool band_receive(void *context, const Film *band)
 {
     const uint32_t samples = band->samples;
-    Taken *taken = context;
-    film_copy_band(&taken->film, band);
+    Received *received = context;
+    film_copy_band(&received->film, band);
     if (!band->color) {
         assert_int_equal(samples, 1);
-        taken->aov_bands++;
+        received->aov_bands++;
         return true;
     }
-    assert_true(samples >= taken->samples);
-    if (taken->color_bands++ == 0) taken->first_samples = samples;
-    taken->samples = samples;
+    assert_true(samples >= received->samples);
+    if (received->color_bands++ == 0) received->first_samples = samples;
+    received->samples = samples;
     return true;
 }
 
@@ -38,14 +38,14 @@ TEST(passes_give_the_bits_of_one_render)
     OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOVS);
     settings.band_rows = 8;
     Renderer *renderer = probe_renderer(&scene, &settings);
-    Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
-    assert_true(renderer_accumulate(renderer, AOVS, take, &taken));
-    assert_int_equal(taken.first_samples, 1);
-    assert_int_equal(taken.samples, SAMPLES);
-    assert_int_equal(taken.aov_bands, 5);
-    assert_true(taken.color_bands >= 10 && taken.color_bands % 5 == 0);
-    film_assert_same(&taken.film, &expected, "passes");
-    film_free(&taken.film);
+    Received received = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
+    assert_true(renderer_accumulate(renderer, AOVS, band_receive, &received));
+    assert_int_equal(received.first_samples, 1);
+    assert_int_equal(received.samples, SAMPLES);
+    assert_int_equal(received.aov_bands, 5);
+    assert_true(received.color_bands >= 10 && received.color_bands % 5 == 0);
+    film_assert_same(&received.film, &expected, "passes");
+    film_free(&received.film);
     renderer_close(renderer);
 }
 
@@ -95,13 +95,13 @@ TEST(passes_stop)
     settings.stop = stop_now;
     Renderer *renderer = probe_renderer(&scene, &settings);
     for (unsigned launches = 0; launches < 9; launches++) {
-        Taken taken = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
+        Received received = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
         stop_countdown = launches;
-        assert_false(renderer_accumulate(renderer, AOVS, take, &taken));
+        assert_false(renderer_accumulate(renderer, AOVS, band_receive, &received));
         // the band of the launch after which it stops is not delivered
-        if (launches < 5) assert_int_equal(taken.color_bands, launches);
-        assert_true(taken.color_bands <= launches);
-        film_free(&taken.film);
+        if (launches < 5) assert_int_equal(received.color_bands, launches);
+        assert_true(received.color_bands <= launches);
+        film_free(&received.film);
     }
     renderer_close(renderer);
 }

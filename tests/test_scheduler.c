@@ -54,12 +54,12 @@ static Scheduler *start(Sink *sink, size_t worker_count)
                                                .context = sink});
 }
 
-static BandRows take(Scheduler *scheduler, size_t worker)
+static BandRows acquire(Scheduler *scheduler, size_t worker)
 {
     return scheduler_acquire(scheduler, worker, ROWS_MAX, STEP);
 }
 
-static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
+static bool deliver(Scheduler *scheduler, size_t worker, BandRows rows)
 {
     float values[ROWS * WIDTH * COMPONENTS];
     for (uint32_t row = 0; row < rows.row_count; row++)
@@ -75,22 +75,22 @@ static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
 
 static void work(Scheduler *scheduler, size_t worker)
 {
-    for (BandRows rows; (rows = take(scheduler, worker)).row_count > 0;)
-        if (!give(scheduler, worker, rows)) break;
+    for (BandRows rows; (rows = acquire(scheduler, worker)).row_count > 0;)
+        if (!deliver(scheduler, worker, rows)) break;
 }
 
 // Renders the rows in their time at that pace.
-static bool give_at(Scheduler *scheduler, size_t worker, BandRows rows, unsigned rows_per_second)
+static bool deliver_at(Scheduler *scheduler, size_t worker, BandRows rows, unsigned rows_per_second)
 {
     milliseconds += 1000 * rows.row_count / rows_per_second;
-    return give(scheduler, worker, rows);
+    return deliver(scheduler, worker, rows);
 }
 
 // Renders each worker's first band at its pace.
 static void set_paces(Scheduler *scheduler, size_t worker_count, const unsigned *rows_per_second)
 {
     for (size_t i = 0; i < worker_count; i++)
-        assert_true(give_at(scheduler, i, take(scheduler, i), rows_per_second[i]));
+        assert_true(deliver_at(scheduler, i, acquire(scheduler, i), rows_per_second[i]));
 }
 
 TEST(one_worker_gets_what_it_asks_for)
@@ -111,14 +111,14 @@ TEST(lower_bands_wait)
     Sink sink;
     WorkerShare shares[3];
     Scheduler *scheduler = start(&sink, 3);
-    BandRows first = take(scheduler, 0), second = take(scheduler, 1), third = take(scheduler, 2);
+    BandRows first = acquire(scheduler, 0), second = acquire(scheduler, 1), third = acquire(scheduler, 2);
     assert_int_equal(first.first_row, 0);
     assert_int_equal(second.first_row, first.row_count);
     assert_int_equal(third.first_row, second.first_row + second.row_count);
-    assert_true(give(scheduler, 2, third));
-    assert_true(give(scheduler, 1, second));
+    assert_true(deliver(scheduler, 2, third));
+    assert_true(deliver(scheduler, 1, second));
     assert_int_equal(sink.rows, 0);
-    assert_true(give(scheduler, 0, first));
+    assert_true(deliver(scheduler, 0, first));
     assert_int_equal(sink.bands, 3);
     work(scheduler, 2);
     assert_true(scheduler_close(scheduler, shares));
@@ -133,7 +133,7 @@ TEST(first_bands_are_short)
     Sink sink;
     Scheduler *scheduler = start(&sink, 3);
     for (size_t i = 0; i < 3; i++)
-        assert_int_equal(take(scheduler, i).row_count, STEP);
+        assert_int_equal(acquire(scheduler, i).row_count, STEP);
     scheduler_end(scheduler);
     assert_false(scheduler_close(scheduler, NULL));
 }
@@ -146,9 +146,9 @@ TEST(bands_shrink)
     set_paces(scheduler, 2, (const unsigned[]){4, 4});
     static const uint32_t expected[] = {12, 8, 8, 4, 4, 4, 4, 4, 4, 4}; // of 56, 44, 36, 28 …
     for (size_t i = 0; i < COUNT_OF(expected); i++) {
-        const BandRows rows = take(scheduler, i % 2);
+        const BandRows rows = acquire(scheduler, i % 2);
         assert_int_equal(rows.row_count, expected[i]);
-        assert_true(give_at(scheduler, i % 2, rows, 4));
+        assert_true(deliver_at(scheduler, i % 2, rows, 4));
     }
     assert_true(scheduler_close(scheduler, NULL));
     assert_true(sink.is_right);
@@ -174,7 +174,7 @@ TEST(the_slow_leave_the_rest)
     bool waits = false;
     assert_int_equal(scheduler_try(scheduler, 0, ROWS_MAX, STEP, &waits).row_count, 0);
     assert_true(waits);
-    const BandRows lost = take(scheduler, 1);
+    const BandRows lost = acquire(scheduler, 1);
     assert_int_equal(lost.row_count, ROWS_MAX);
     scheduler_drop(scheduler, 1);
     work(scheduler, 0);
@@ -186,16 +186,16 @@ TEST(a_dropped_workers_rows_go_to_others)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
-    BandRows lost = take(scheduler, 1), kept = take(scheduler, 0);
+    BandRows lost = acquire(scheduler, 1), kept = acquire(scheduler, 0);
     assert_int_equal(lost.first_row, 0);
     scheduler_drop(scheduler, 1);
     assert_int_equal(sink.dropped_count, 1);
     assert_int_equal(sink.dropped, 1);
-    assert_true(give(scheduler, 0, kept));
+    assert_true(deliver(scheduler, 0, kept));
     assert_int_equal(sink.rows, 0);
-    BandRows again = take(scheduler, 0);
+    BandRows again = acquire(scheduler, 0);
     assert_int_equal(again.first_row, 0);
-    assert_true(give(scheduler, 0, again));
+    assert_true(deliver(scheduler, 0, again));
     work(scheduler, 0);
     assert_true(scheduler_close(scheduler, NULL));
     assert_true(sink.is_right);
@@ -205,9 +205,9 @@ TEST(nobody_is_left)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
-    take(scheduler, 0);
+    acquire(scheduler, 0);
     scheduler_drop(scheduler, 0);
-    take(scheduler, 1);
+    acquire(scheduler, 1);
     scheduler_drop(scheduler, 1);
     assert_int_equal(sink.dropped_count, 1); // nobody could continue after the last
     assert_false(scheduler_close(scheduler, NULL));
@@ -218,14 +218,14 @@ TEST(the_sink_ends_the_render)
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     sink.bands_max = 2;
-    BandRows first = take(scheduler, 0), second = take(scheduler, 1);
-    assert_true(give(scheduler, 0, first));
-    BandRows third = take(scheduler, 0);
+    BandRows first = acquire(scheduler, 0), second = acquire(scheduler, 1);
+    assert_true(deliver(scheduler, 0, first));
+    BandRows third = acquire(scheduler, 0);
     assert_false(scheduler_has_ended(scheduler));
-    assert_false(give(scheduler, 1, second));
-    assert_false(give(scheduler, 0, third));
+    assert_false(deliver(scheduler, 1, second));
+    assert_false(deliver(scheduler, 0, third));
     assert_true(scheduler_has_ended(scheduler));
-    assert_int_equal(take(scheduler, 1).row_count, 0);
+    assert_int_equal(acquire(scheduler, 1).row_count, 0);
     assert_false(scheduler_close(scheduler, NULL));
     assert_int_equal(sink.bands, 2);
 }
@@ -237,7 +237,7 @@ static void work_a_step(Scheduler *scheduler, uint32_t first_row)
     BandRows rows = scheduler_try(scheduler, 1, STEP, STEP, &waits);
     assert_int_equal(rows.first_row, first_row);
     assert_int_equal(rows.row_count, STEP);
-    assert_true(give(scheduler, 1, rows));
+    assert_true(deliver(scheduler, 1, rows));
 }
 
 // A worker that is too far ahead waits for the one that has the top, or for what that leaves.
@@ -252,7 +252,7 @@ TEST(few_bands_wait)
                                                 .sink = band_sink,
                                                 .context = &sink,
                                                 .waiting_bytes_max = 3 * STEP * ROW_BYTES});
-        BandRows top = take(scheduler, 0);
+        BandRows top = acquire(scheduler, 0);
         assert_int_equal(top.row_count, STEP);
         work_a_step(scheduler, STEP);
         work_a_step(scheduler, 2 * STEP);
@@ -263,7 +263,7 @@ TEST(few_bands_wait)
             scheduler_drop(scheduler, 0);
             work_a_step(scheduler, 0);
         } else {
-            assert_true(give(scheduler, 0, top));
+            assert_true(deliver(scheduler, 0, top));
             work_a_step(scheduler, 3 * STEP);
         }
         work(scheduler, 1);
@@ -275,15 +275,15 @@ TEST(few_bands_wait)
 typedef struct {
     Scheduler *scheduler;
     size_t worker;
-    atomic_uint given_rows;
+    atomic_uint delivered_rows;
 } WorkerThread;
 
 static void *thread_work(void *argument)
 {
     WorkerThread *thread = argument;
-    for (BandRows rows; (rows = take(thread->scheduler, thread->worker)).row_count > 0;) {
-        if (!give(thread->scheduler, thread->worker, rows)) break;
-        thread->given_rows += rows.row_count;
+    for (BandRows rows; (rows = acquire(thread->scheduler, thread->worker)).row_count > 0;) {
+        if (!deliver(thread->scheduler, thread->worker, rows)) break;
+        thread->delivered_rows += rows.row_count;
     }
     return NULL;
 }
@@ -293,11 +293,11 @@ TEST(idle_workers_wait_for_lost_rows)
 {
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
-    const BandRows lost = take(scheduler, 0);
+    const BandRows lost = acquire(scheduler, 0);
     WorkerThread other = {.scheduler = scheduler, .worker = 1};
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, thread_work, &other), 0);
-    while (other.given_rows < ROWS - lost.row_count)
+    while (other.delivered_rows < ROWS - lost.row_count)
         usleep(1000);
     usleep(20000); // so that it is already waiting; the test would also pass if it were not
     bool waits;
@@ -331,7 +331,7 @@ TEST(many_threads)
 static int alarm_set(void **state)
 {
     (void)state;
-    alarm(60); // a worker that waits for ever
+    alarm(60); // ends a test in which a worker waits forever
     return 0;
 }
 

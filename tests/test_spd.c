@@ -25,7 +25,7 @@ static const struct {
     {"tree", {169836, 0, 0, 1097419}},
 };
 
-static bool take_band(void *context, const Film *band)
+static bool band_ignore(void *context, const Film *band)
 {
     (void)context;
     (void)band;
@@ -55,7 +55,7 @@ static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
     settings.bounce_count = 4;
     settings.counting = true;
     Renderer *renderer = probe_renderer(&scene, &settings);
-    assert_true(renderer_render(renderer, 0, take_band, NULL));
+    assert_true(renderer_render(renderer, 0, band_ignore, NULL));
     for (size_t i = 0; i < COLUMN_COUNT; i++)
         counts[i] = renderer_report(renderer)->rays[column_rays[i]];
     renderer_close(renderer);

@@ -22,7 +22,7 @@ typedef struct {
 
 extern InjectedFailure injected;
 extern pthread_t first_thread;
-extern bool first_is_tiny; // the first device has room for no scene
+extern bool first_is_tiny; // the first device reports that its buffers have at most one byte
 extern bool disk_is_full;
 extern atomic_long live_count; // objects created and mapped, less those released
 

@@ -1,8 +1,8 @@
 """Computes the color of an image's ray at 300 bits, and a bound on the error of a renderer that rounds.
 
-Every result carries a first-order bound on rounding. A shape is assumed to be computed exactly except for a displacement of its surface by `displacement` units in the last place of the magnitudes that
-it is computed from; where a surface so much nearer and so much farther answers differently, or another surface comes
-in between, the answer is open and nothing is compared."""
+Every result carries a first-order bound on rounding. A shape is assumed to be computed exactly except for a displacement of its
+surface by `displacement` units in the last place of the magnitudes that it is computed from. If a surface that is so much nearer or
+farther gives another answer, or another surface comes in between, the answer is open and nothing is compared."""
 
 from math import floor, inf, log, sqrt
 
