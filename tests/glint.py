@@ -165,6 +165,16 @@ def has_device(**options):
     return re.search("^[0-9]", run("devices", **options).stdout, re.MULTILINE) is not None
 
 
+# Environments with PoCL alone, and with its device twice.
+POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
+TWO = POCL | {"POCL_DEVICES": "pthread pthread"}
+
+
+def need_pocl():
+    if not has_device(env=POCL):
+        skip_all("PoCL is not installed")
+
+
 class TestCase(unittest.TestCase):
     """Each test runs in a new folder with these files."""
 
@@ -265,6 +275,14 @@ def png_read(path):
     rows = zlib.decompress(b"".join(body for kind, body in chunks if kind == "IDAT"))
     texts = dict(body.decode("latin-1").split("\0", 1) for kind, body in chunks if kind == "tEXt")
     return struct.unpack(">IIBB", chunks[0][1][:10]), rows, texts, [kind for kind, _ in chunks]
+
+
+def file_size(path):
+    """Returns the size of a file that other processes write, or 0 if there is none."""
+    try:
+        return os.stat(path).st_size
+    except FileNotFoundError:  # it may have just been removed
+        return 0
 
 
 def checkpoint_rows(path):

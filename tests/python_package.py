@@ -1,18 +1,14 @@
 """Provides the Python package of host/python over the build's library, for its tests, and what they trace."""
 import os
 import sys
-from pathlib import Path
 
-from glint import need_modules
+from glint import IS_LONG, IS_SANITIZED, ROOT, need_modules, skip_all
 
-IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
+if IS_SANITIZED:
+    skip_all("Python does not start with a sanitizer's runtime")
 need_modules("numpy=numpy==2.4.6", *(["matplotlib=matplotlib==3.11.2"] if IS_LONG else []))
 del sys.modules["glint"]  # the tests' own module, not the package
-ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / os.environ.get("BUILD", "build")
-if BUILD.name.endswith("-sanitize"):
-    print("skipped: Python does not start with a sanitizer's runtime")
-    sys.exit(77)
 os.environ["GLINT_LIBRARY"] = str(BUILD / "libglint.so.1")
 os.environ.pop("GLINT_DEVICE", None)
 sys.path.insert(0, str(ROOT / "host/python"))

@@ -10,11 +10,10 @@ import time
 import unittest
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, POCL, PROGRAM, SPHERE, TWO, TestCase, checkpoint_rows, file_size, main, need_pocl, png_read, shim_build, write
 
-# one compute unit: bands are short
-POCL = {"OCL_ICD_VENDORS": find_icd("pocl"), "POCL_MAX_PTHREAD_COUNT": "1"}
-TWO = POCL | {"POCL_DEVICES": "pthread pthread"}
+# one compute unit, so that bands are short
+POCL, TWO = (env | {"POCL_MAX_PTHREAD_COUNT": "1"} for env in (POCL, TWO))
 ROWS = 256
 RENDER = f"render sphere.yaml --size 64x{ROWS} --samples 100 --precision strict --quiet"
 ROW_BYTES = 64 * 3 * 4
@@ -34,11 +33,8 @@ int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void 
 """
 
 
-def size(path):
-    try:
-        return os.stat(path).st_size
-    except FileNotFoundError:  # also where it is removed just now
-        return 0
+def limit_files():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
 
 
 class Checkpoints(TestCase):
@@ -50,9 +46,8 @@ class Checkpoints(TestCase):
     def end_early(self, options="", env=None):
         """Renders until the disk is full."""
         self.glint(f"{RENDER} {options} -o whole.npy", env=env or POCL)  # the drivers' files are written
-        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
         self.refuses(f"{RENDER} {options} -o part.png --checkpoint saved", "cannot write the checkpoint 'saved': File too large",
-                     env=env or POCL, preexec_fn=limit)
+                     env=env or POCL, preexec_fn=limit_files)
         self.assertFalse(os.path.exists("part.png"))
 
     def resume(self, options="", env=None):
@@ -134,9 +129,8 @@ class Checkpoints(TestCase):
 
     def test_other_devices_at_single(self):
         single = RENDER.replace("strict", "single")
-        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
         self.glint(f"{single} -o other.png", env=POCL)
-        self.refuses(f"{single} -o other.png --checkpoint saved", "File too large", env=POCL, preexec_fn=limit)
+        self.refuses(f"{single} -o other.png --checkpoint saved", "File too large", env=POCL, preexec_fn=limit_files)
         self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"belongs to another image \(device: ", env=POCL)
 
     def test_the_image_itself(self):
@@ -151,8 +145,7 @@ class Checkpoints(TestCase):
         self.glint(f"{frames} --frames 0-2 -o whole%d.npy", env=POCL)
         command = f"{frames} --frames 0-2 --skip-existing --checkpoint saved-%02d -o image%d.npy --timing=json"
         write("image0.npy", "kept")
-        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
-        process = self.refuses(command, "cannot write the checkpoint 'saved-01': File too large", env=POCL, preexec_fn=limit)
+        process = self.refuses(command, "cannot write the checkpoint 'saved-01': File too large", env=POCL, preexec_fn=limit_files)
         self.assertIn("finished bands are in 'saved-01'", process.stderr)
         os.remove("saved-02")
         reports = [json.loads(line) for line in self.glint(command, env=POCL).stdout.splitlines()]
@@ -178,8 +171,8 @@ class Checkpoints(TestCase):
         while kills < KILLS:
             process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
             # between what is saved and slightly more than the whole, and at any moment of a band
-            least = moments.uniform(size("saved"), 1.1 * ROWS * ROW_BYTES)
-            while process.poll() is None and size("saved") < least:
+            least = moments.uniform(file_size("saved"), 1.1 * ROWS * ROW_BYTES)
+            while process.poll() is None and file_size("saved") < least:
                 time.sleep(0.001)
             time.sleep(moments.choice((0, moments.uniform(0, 0.02))))
             if process.poll() is None:
@@ -198,6 +191,5 @@ class Checkpoints(TestCase):
 
 
 if __name__ == "__main__":
-    if not has_device(env=POCL):
-        skip_all("PoCL is not installed")
+    need_pocl()
     main()

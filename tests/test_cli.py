@@ -6,7 +6,7 @@ import os
 import re
 import unittest
 
-from glint import ROOT, SPHERE, TestCase, csv_rows, find_icd, main, need_device, read, run, write
+from glint import POCL, ROOT, SPHERE, TestCase, csv_rows, main, need_device, read, run, write
 
 SMALL = "--size 8x6 --quiet"
 SCENES = ROOT / "tests/scenes"
@@ -116,11 +116,11 @@ class Commands(TestCase):
         self.refuses("render sphere.yaml", 'device.*"toaster"', env={"GLINT_DEVICE": "toaster"})
         self.refuses("render sphere.yaml", "no OpenCL device.*pocl", env={"OCL_ICD_VENDORS": os.path.abspath("none.icd")})
 
-    @unittest.skipUnless(os.path.exists(find_icd("pocl")), "PoCL is not installed")
+    @unittest.skipUnless(os.path.exists(POCL["OCL_ICD_VENDORS"]), "PoCL is not installed")
     def test_pocl_without_a_cache(self):
         """Debian's PoCL has no device where it cannot write its cache."""
         process = run("devices", wrapper=("env", "-u", "POCL_CACHE_DIR"),
-                      env={"XDG_CACHE_HOME": "/dev/null", "OCL_ICD_VENDORS": find_icd("pocl")})
+                      env=POCL | {"XDG_CACHE_HOME": "/dev/null"})
         if process.returncode == 0:
             self.assertRegex(process.stdout, "(?m)^[0-9]")
         else:

@@ -8,9 +8,8 @@ import os
 import re
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, main, need_device, npy_read, read, run, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, POCL, ROOT, SPHERE, TestCase, main, need_device, need_pocl, npy_read, read, shim_build, skip_all, write
 
-POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 RENDER = "render sphere.yaml --quiet --size 320x200 -o image.npy"
 STRICT = f"{RENDER} --precision strict --lanes 1"
 TRACE = "trace sphere.yaml --rays rays.txt --precision strict --lanes 1"
@@ -85,9 +84,9 @@ class DeviceLimits(TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = os.path.join(os.environ.get("TMPDIR", "/tmp"), f"glint-limits-{os.getpid()}.so")
-        cls.shim = shim_build(cls.folder, read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
-        cls.addClassCleanup(os.unlink, cls.folder)
+        path = os.path.join(os.environ.get("TMPDIR", "/tmp"), f"glint-limits-{os.getpid()}.so")
+        cls.shim = shim_build(path, read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
+        cls.addClassCleanup(os.unlink, path)
 
     def test_works_within(self):
         for limits, command in WORKS:
@@ -232,6 +231,5 @@ if __name__ == "__main__":
     if IS_SANITIZED:
         skip_all("sanitizers must be loaded before a shim")
     need_device()
-    if run("devices", env=POCL).returncode != 0:
-        skip_all("PoCL is not installed")
+    need_pocl()
     main()

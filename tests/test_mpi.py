@@ -14,9 +14,8 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, plain, png_read, read, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
 
-POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
               "OMPI_MCA_mpi_yield_when_idle": "1",  # ranks that wait leave the processor to other tests
               # more ranks than processors, in Open MPI 4 and in 5
@@ -315,17 +314,11 @@ class Mpi(TestCase):
 
         `patience`: the seconds for which mpirun waits before it ends a rank, and again before it kills it.
         """
-        def size():
-            try:
-                return os.stat("saved").st_size
-            except FileNotFoundError:  # also where it is removed just now
-                return 0
-
-        before = max(size(), 4096)
+        before = max(file_size("saved"), 4096)
         write("rank.sh", f"exec {RANKS} {command} -o ranks.npy --checkpoint saved 2>>errors\n")
         process = subprocess.Popen(["mpirun", "--mca", "odls_base_sigkill_timeout", str(patience), "-n", "3", "sh", "rank.sh"],
                                    env=environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while process.poll() is None and size() <= before:
+        while process.poll() is None and file_size("saved") <= before:
             time.sleep(0.001)
         return process
 
@@ -386,8 +379,7 @@ if __name__ == "__main__":
         skip_all("Open MPI is not installed")
     if IS_SANITIZED:
         skip_all("Open MPI leaks")
-    if not has_device(env=POCL):
-        skip_all("PoCL is not installed")
+    need_pocl()
     made = subprocess.run(["make", "-s", "mpi", f"BUILD={os.path.relpath(BUILD, ROOT)}"], cwd=ROOT, check=False)
     if made.returncode:
         raise SystemExit("make mpi failed")

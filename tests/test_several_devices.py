@@ -13,10 +13,8 @@ import sys
 import unittest
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, find_icd, has_device, main, png_read, read, run, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, POCL, ROOT, SPHERE, TWO, TestCase, find_icd, main, need_pocl, png_read, read, run, shim_build, write
 
-POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
-TWO = {"env": POCL["env"] | {"POCL_DEVICES": "pthread pthread"}}
 INTEL = next(Path(os.environ.get("INTEL_OPENCL_RT", "/none")).rglob("libintelocl.so"), Path("/none"))
 OCLGRIND = Path(shutil.which("oclgrind") or "/none").parent.parent / "lib/oclgrind/liboclgrind-rt-icd.so"
 FAILURES = 200 if IS_LONG else 10
@@ -60,7 +58,7 @@ class SeveralDevices(TestCase):
         write("sphere.yaml", SPHERE)
 
     def makes(self):
-        """Returns options of run for all installed implementations together."""
+        """Returns the environment of all installed implementations together."""
         os.mkdir("vendors")
         for name in "pocl", "rusticl":
             if Path(find_icd(name)).exists():
@@ -70,20 +68,20 @@ class SeveralDevices(TestCase):
                 write(f"vendors/{library.name}.icd", str(library))
         # optimized, LLVM leaves calls that Oclgrind 21.10 does not know
         options = {"RUSTICL_ENABLE": "llvmpipe", "OCLGRIND_BUILD_OPTIONS": "-cl-opt-disable"}
-        together = {"env": options | {"OCL_ICD_VENDORS": os.path.abspath("vendors")}}
-        names = {device["platform"] for device in self.json("devices --json", **together)["devices"]}
+        together = options | {"OCL_ICD_VENDORS": os.path.abspath("vendors")}
+        names = {device["platform"] for device in self.json("devices --json", env=together)["devices"]}
         if len(names) < 2:
             self.skipTest("only one OpenCL implementation is installed")
         print(f"makes: {', '.join(sorted(names))}")
         return together
 
-    def on_all(self, command, options):
+    def on_all(self, command, env):
         """Renders all.npy by all devices, each of which has a band. Returns the report, unless sanitizers forbid the barrier."""
-        count = len(self.json("devices --json", **options)["devices"])
+        count = len(self.json("devices --json", env=env)["devices"])
         if not IS_SANITIZED:
             barrier = shim_build("barrier.so", BARRIER)
-            options = {"env": options["env"] | {"LD_PRELOAD": barrier, "BARRIER_QUEUES": str(count)}}
-        report = self.json(f"{command} -o all.npy --device all --timing=json", **options)
+            env = env | {"LD_PRELOAD": barrier, "BARRIER_QUEUES": str(count)}
+        report = self.json(f"{command} -o all.npy --device all --timing=json", env=env)
         self.assertEqual(len(report["by_device"]), count)
         if not IS_SANITIZED:
             self.assertTrue(all(device["bands"] > 0 for device in report["by_device"]))
@@ -92,7 +90,7 @@ class SeveralDevices(TestCase):
     def test_two_of_one_make(self):
         for precision in "single", "strict", "double":
             command = f"render sphere.yaml {LARGE} --samples 3 --precision {precision} --aov {','.join(AOVS)}"
-            self.glint(f"{command} -o one.npy", **POCL)
+            self.glint(f"{command} -o one.npy", env=POCL)
             report = self.on_all(command, TWO)
             for end in "npy", *(f"{aov}.npy" for aov in AOVS):
                 self.assertSameBytes(f"one.{end}", f"all.{end}")
@@ -108,15 +106,15 @@ class SeveralDevices(TestCase):
         """If any OpenCL call of either device fails, the image is right, or there is an error and none."""
         shim = shim_build("chaos.so", read(ROOT / "tools/chaos.c"), "-ldl")
         command = f"render sphere.yaml {LARGE} --samples 20 --precision strict"
-        self.glint(f"{command} -o one.npy", **POCL)
+        self.glint(f"{command} -o one.npy", env=POCL)
         chaos = {"LD_PRELOAD": shim, "GLINT_CHAOS_LOG": os.path.abspath("calls")}
-        self.glint(f"{command} --device all -o all.npy", env=TWO["env"] | chaos)
+        self.glint(f"{command} --device all -o all.npy", env=TWO | chaos)
         count = int(re.search(r"^cl (\d+)", Path("calls").read_text(encoding="utf-8"), re.MULTILINE)[1])
         draw, images, dropped = random.Random(20), 0, 0
         for _ in range(FAILURES):
             Path("all.npy").unlink(missing_ok=True)
             call = draw.randrange(count)
-            process = run(f"{command} --device all -o all.npy", env=TWO["env"] | chaos | {"GLINT_CHAOS": f"cl {call}"}, timeout=120)
+            process = run(f"{command} --device all -o all.npy", env=TWO | chaos | {"GLINT_CHAOS": f"cl {call}"}, timeout=120)
             with self.subTest(call=call, errors=process.stderr):
                 self.assertIn(process.returncode, (0, 1, 2))
                 if process.returncode == 0:
@@ -135,26 +133,26 @@ class SeveralDevices(TestCase):
 
     def test_names(self):
         """The files' notes name both devices, and devices of one make round alike."""
-        self.glint(f"render sphere.yaml {SIZE} --device 1,0 -o two.png", **TWO)
+        self.glint(f"render sphere.yaml {SIZE} --device 1,0 -o two.png", env=TWO)
         _, _, texts, _ = png_read("two.png")
         for key in "Device", "Driver", "Lanes", "Kernel":
             one, _, other = texts[key].partition(" + ")
             self.assertEqual(one, other, key)
         self.assertNotIn("Comment", texts)
-        process = self.glint(f"render sphere.yaml {SIZE} --device all --timing -o two.png", **TWO)
+        process = self.glint(f"render sphere.yaml {SIZE} --device all --timing -o two.png", env=TWO)
         self.assertEqual(process.stderr.count("% of the rows in "), 2, process.stderr)
 
     def test_wrong_lists(self):
         for devices, pattern in (("0,0", "device 0 .* is listed twice"), ("portable,0", "device 0 .* is listed twice"),
                                  ("0,2", 'no usable device matches "2"'), ("0,", 'no usable device matches ""')):
-            self.refuses(f"render sphere.yaml {SIZE} --device {devices}", pattern, **TWO)
+            self.refuses(f"render sphere.yaml {SIZE} --device {devices}", pattern, env=TWO)
 
     @unittest.skipIf(IS_SANITIZED, "drivers leak")
     def test_makes(self):
         """All makes render one image. Oclgrind, ten thousand times slower than the others, gets a few rows."""
         together = self.makes()
         command = f"render sphere.yaml {LARGE} --precision strict"
-        self.glint(f"{command} -o one.npy", **POCL)
+        self.glint(f"{command} -o one.npy", env=POCL)
         report = self.on_all(command, together)
         self.assertSameBytes("one.npy", "all.npy")
         for device in report["by_device"]:
@@ -166,12 +164,11 @@ class SeveralDevices(TestCase):
         """An image's notes state whether its devices may round differently."""
         together = self.makes()
         for precision in "single", "strict":
-            self.glint(f"render sphere.yaml --size 64x8 --quiet --precision {precision} --device all -o all.png", **together)
+            self.glint(f"render sphere.yaml --size 64x8 --quiet --precision {precision} --device all -o all.png", env=together)
             comment = "rendered by devices that may round differently" if precision == "single" else None
             self.assertEqual(png_read("all.png")[2].get("Comment"), comment)
 
 
 if __name__ == "__main__":
-    if not has_device(**POCL):
-        skip_all("PoCL is not installed")
+    need_pocl()
     main()

@@ -3,10 +3,8 @@
 import math
 import os
 
-from glint import SPHERE, TestCase, find_icd, has_device, main, npy_read, png_read, skip_all, write
+from glint import POCL, SPHERE, TWO, TestCase, main, need_pocl, npy_read, png_read, write
 
-POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
-TWO = POCL | {"POCL_DEVICES": "pthread pthread"}
 # A disc of radius 0.5, whose colors are its coverage and whose center moves from x = -0.75 to 0.75 between frames 1 and 1.5.
 DISC = """\
 camera: {position: [0, 0, 4], look_at: [0, 0, 0], height: 1.2}
@@ -143,6 +141,5 @@ class Shutter(TestCase):
 
 
 if __name__ == "__main__":
-    if not has_device(env=POCL):
-        skip_all("PoCL is not installed")
+    need_pocl()
     main()

@@ -465,8 +465,8 @@ class View(TestCase):
         before = screen()
         window.key("i")
         window.line(r"^pixel 80,60: sphere 3, scene.yaml:6, t ")
-        numbers = window.line(r"^  at ([-.\d]+) ([-.\d]+) ([-.\d]+), normal ([-.\d]+) ([-.\d]+) ([-.\d]+)$").groups()
-        point, normal = [float(number) for number in numbers[:3]], [float(number) for number in numbers[3:]]
+        groups = window.line(r"^  at ([-.\d]+) ([-.\d]+) ([-.\d]+), normal ([-.\d]+) ([-.\d]+) ([-.\d]+)$").groups()
+        point, normal = [float(number) for number in groups[:3]], [float(number) for number in groups[3:]]
         self.glint(f"render scene.yaml --size {WIDTH}x{HEIGHT} --aov position -o image.npy")
         for printed, position in zip(point, npy_read("image.position.npy")[2][60 * WIDTH + 80], strict=True):
             self.assertAlmostEqual(printed, position, 5)
