@@ -511,4 +511,10 @@ TEST(nonfinite_colors_are_errors)
     }
 }
 
+// A distance of 0 from a wrong normal or position would be within every bound.
+TEST(distance_from_nan_is_nan)
+{
+    assert_true(isnan(reference_distance((Vector3){NAN, 0, 1}, quad3((Vector3){0, 0, 1}))));
+}
+
 TEST_MAIN(NULL, NULL)

@@ -85,13 +85,13 @@ static inline Quad quad_maximum(Quad a, Quad b)
     return a > b ? a : b;
 }
 
-// Returns the square root, or 0 where `a` is not positive. With a = near^2 + rest, the root is near + rest /
-// (near + root), and near + root is 2 near + rest / (2 near) to three times the bits of a double. This takes
-// half the time of the C library's function, which handles values outside the range of a double. A start from
-// a long double would give different last bits on different processors.
+// Returns the square root, 0 where `a` is negative, or NaN where it is NaN. With a = near^2 + rest, the root
+// is near + rest / (near + root), and near + root is 2 near + rest / (2 near) to three times the bits of a
+// double. This takes half the time of the C library's function, which handles values outside the range of a
+// double. A start from a long double would give different last bits on different processors.
 static inline Quad quad_root(Quad a)
 {
-    if (!(a > 0)) return 0;
+    if (a <= 0) return 0;
     if (!(a > 0x1p-900 && a < 0x1p900)) return QUAD_CALL(sqrt)(a);
     const double near = sqrt((double)a);
     const Quad rest = a - (Quad)near * near;
