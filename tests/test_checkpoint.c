@@ -5,6 +5,7 @@
 #include "tests/files.h"
 #include <errno.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 
 enum { WIDTH = 5, ROWS = 12, BAND_ROWS = 4, BANDS = ROWS / BAND_ROWS, COLOR_VALUES = BAND_ROWS * WIDTH * 3 };
 static const char key[] = "size: 5x12\nscene: 1234\n";
@@ -283,6 +284,56 @@ TEST(a_file_that_stays)
     assert_non_null(strstr(messages.items[0].text, "cannot remove the checkpoint"));
     assert_non_null(strstr(messages.items[0].text, strerror(EPERM)));
     assert_int_equal(unlink(path), 0);
+}
+
+static int sync_error; // 0 if syncs succeed
+
+int fsync(int descriptor) // NOLINT(readability-inconsistent-declaration-parameter-name)
+{
+    if (sync_error == 0) return (int)syscall(SYS_fsync, descriptor);
+    errno = sync_error;
+    return -1;
+}
+
+// The bands of the last second are synced when the file is closed. Not every file system can sync.
+TEST(syncs_that_fail)
+{
+    unlink(path);
+    Checkpoint *checkpoint = open_checked();
+    append(checkpoint, 0);
+    OwnedMessageList messages = {0};
+    sync_error = EIO;
+    checkpoint_close(checkpoint, false, &messages);
+    assert_int_equal(messages.count, 1);
+    assert_non_null(strstr(messages.items[0].text, "cannot write the checkpoint"));
+    assert_non_null(strstr(messages.items[0].text, strerror(EIO)));
+    refused("size: 6x12\nscene: 1234\n", "belongs to another image"); // which has nothing to sync
+    unlink(path);
+    sync_error = EINVAL;
+    checkpoint = open_checked();
+    append(checkpoint, 0);
+    close_checked(checkpoint, false);
+    sync_error = 0;
+}
+
+static bool truncation_fails;
+
+int ftruncate(int descriptor, off_t length) // NOLINT(readability-inconsistent-declaration-parameter-name)
+{
+    char name[64];
+    snprintf(name, sizeof name, "/proc/self/fd/%d", descriptor);
+    if (!truncation_fails) return truncate(name, length);
+    errno = EPERM;
+    return -1;
+}
+
+TEST(torn_record_that_stays)
+{
+    OwnedText bytes = file_make();
+    file_write_bytes(path, bytes.items, bytes.count - 1);
+    truncation_fails = true;
+    refused(key, "cannot write the checkpoint");
+    truncation_fails = false;
 }
 
 // Another process completes its image and removes the file before this one has locked it.

@@ -42,7 +42,7 @@ typedef enum { RECORD_WHOLE, RECORD_TORN, RECORD_FAILED } RecordState;
 
 struct Checkpoint {
     char *path;      // as the user gave it
-    char *file_path; // behind symbolic links
+    char *file_path; // behind symbolic links; NULL until the file is open
     FilmHeader film; // describes all rows
     int descriptor;
     pthread_mutex_t mutex;
@@ -134,7 +134,8 @@ static bool rows_mark(bool *is_saved, const Film *band)
 }
 
 // Finds the records and cuts off what follows the last whole one. Does not change a file that cannot be read.
-static bool records_find(Checkpoint *checkpoint)
+// Returns what failed, as open_failed reports it, or NULL.
+static const char *records_find(Checkpoint *checkpoint)
 {
     bool *is_saved = memory_allocate_zeroed(checkpoint->film.row_count, sizeof *is_saved);
     Film band;
@@ -146,7 +147,8 @@ static bool records_find(Checkpoint *checkpoint)
     }
     film_free(&band);
     free(is_saved);
-    return state != RECORD_FAILED && ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
+    if (state == RECORD_FAILED) return "read";
+    return ftruncate(checkpoint->descriptor, checkpoint->end) == 0 ? NULL : "write";
 }
 
 // Returns the value in the key's line with the name of `line`, as messages print it. The caller frees it.
@@ -243,7 +245,7 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
     } else if (status.st_size < (off_t)head.count) {
         is_right = ftruncate(checkpoint->descriptor, 0) == 0 &&
                    bytes_write(checkpoint->descriptor, head.items, head.count, 0) &&
-                   fsync(checkpoint->descriptor) == 0;
+                   file_sync(checkpoint->descriptor);
         if (!is_right) open_failed(checkpoint->path, "write", messages);
     }
     checkpoint->end = (off_t)head.count;
@@ -285,15 +287,16 @@ Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader 
     checkpoint->film = *film;
     if (pthread_mutex_init(&checkpoint->mutex, NULL) != 0) fault("out of memory: mutex");
     bool is_open = file_open(checkpoint, messages) && head_check(checkpoint, key, messages);
-    if (is_open && !records_find(checkpoint)) is_open = open_failed(path, "read", messages);
+    const char *failed = is_open ? records_find(checkpoint) : NULL;
+    if (failed) is_open = open_failed(path, failed, messages);
+    if (!is_open) {
+        checkpoint_close(checkpoint, false, messages);
+        return NULL;
+    }
     checkpoint->file_path = realpath(path, NULL);
     if (!checkpoint->file_path) checkpoint->file_path = memory_copy_text(path);
-    if (is_open) {
-        folder_sync(checkpoint);
-        return checkpoint;
-    }
-    checkpoint_close(checkpoint, false, messages);
-    return NULL;
+    folder_sync(checkpoint);
+    return checkpoint;
 }
 
 const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count)
@@ -324,7 +327,7 @@ static bool record_write(Checkpoint *checkpoint, const RecordHeader *record, con
     double now = clock_seconds();
     if (now - checkpoint->synced_seconds < SYNC_SECONDS) return true;
     checkpoint->synced_seconds = now;
-    return fdatasync(checkpoint->descriptor) == 0;
+    return file_sync(checkpoint->descriptor);
 }
 
 bool checkpoint_append(Checkpoint *checkpoint, const Film *band)
@@ -344,6 +347,7 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
     off_t offset = 0;
     for (size_t i = 0; i < checkpoint->bands.count; i++)
         if (checkpoint->bands.items[i].first_row == first_row) offset = checkpoint->offsets.items[i];
+    if (offset == 0) fault("no band of the checkpoint starts at row %u", first_row);
     const RecordState state = record_read(checkpoint, offset, band);
     if (state == RECORD_TORN) errno = EIO; // changed since it was opened
     if (state != RECORD_WHOLE) {
@@ -364,12 +368,11 @@ static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
 
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages)
 {
+    const bool is_kept = checkpoint->file_path && !is_complete;
+    if (is_kept && !file_sync(checkpoint->descriptor)) checkpoint_failed(checkpoint, "write");
     if (checkpoint->failure) message_error(messages, "%s", checkpoint->failure);
     if (is_complete) file_remove(checkpoint, messages);
-    if (checkpoint->descriptor >= 0) {
-        if (!is_complete) fdatasync(checkpoint->descriptor);
-        close(checkpoint->descriptor);
-    }
+    if (checkpoint->descriptor >= 0) close(checkpoint->descriptor);
     pthread_mutex_destroy(&checkpoint->mutex);
     free(checkpoint->bands.items);
     free(checkpoint->offsets.items);

@@ -1,6 +1,7 @@
 // Keeps the finished bands of an image in a file, so that a render that ends early can be resumed. Records
-// are appended, each with its hash, and synced. When the file is opened after a crash, a power failure or a
-// full disk, incomplete records at its end are cut off.
+// are appended, each with its hash, and synced at most once a second, so that a power failure loses little
+// more than the last second. When the file is opened after a crash, a power failure or a full disk,
+// incomplete records at its end are cut off.
 //
 // A checkpoint belongs to one image. Its key is a text with a line "NAME: VALUE" for each thing that the
 // image's bits depend on, the scene last, so that a refusal can name the first line that differs.
@@ -23,8 +24,8 @@ const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count);
 // Appends a band. Any thread may call this. Returns false if the band cannot be written; checkpoint_close
 // then adds the message.
 bool checkpoint_append(Checkpoint *checkpoint, const Film *band);
-// Reads the band that starts at a row; film_free frees it. Returns false if the band cannot be read;
-// checkpoint_close then adds the message.
+// Reads the band that starts at a row, of which there must be one; film_free frees it. Returns false if the
+// band cannot be read; checkpoint_close then adds the message.
 bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band);
 // Closes the file. Adds an error message if a band could not be written or read. If the image `is_complete`,
 // removes the file, or adds a warning if that fails.
