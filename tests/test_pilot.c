@@ -206,4 +206,34 @@ TEST(pilot_chooses)
     assert_int_equal(messages.count, 0);
 }
 
+static unsigned stop_countdown;
+
+static bool stop_now(void *context)
+{
+    (void)context;
+    if (stop_countdown > 0) stop_countdown--;
+    return stop_countdown == 0;
+}
+
+// Float precisions warn of these sizes. A warning does not hide that a sample was stopped.
+TEST(pilot_stops)
+{
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    OwnedScene scene = scene_of_text("a.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
+                                               "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n"
+                                               "  - sphere: {center: [0, 0, -2], radius: 1.0e-13}\n");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.stop = stop_now;
+    OwnedMessageList messages = {0};
+    bool is_whole = false;
+    for (unsigned launches = 1; !is_whole; launches++) {
+        Pilot pilot;
+        stop_countdown = launches;
+        is_whole =
+            pilot_run(&pilot, &(ErrorBudget){1, ERROR_MAX}, &probe_compute, &scene, &settings, &messages);
+        assert_true(is_whole == (stop_countdown > 0));
+    }
+    assert_int_equal(messages.count, 0);
+}
+
 TEST_MAIN(probe_open, probe_close)

@@ -202,7 +202,7 @@ static bool candidates_measure(const PilotRun *run, const Film *reference)
         Film sample;
         MessageList unfit = {0};
         const bool whole = sample_render(run, (Precision)i, &sample, &unfit);
-        const bool is_unfit = unfit.count > 0;
+        const bool is_unfit = message_count(&unfit, MESSAGE_ERROR) > 0;
         message_list_free(&unfit);
         if (!whole && is_unfit) continue;
         if (!whole) return false;
