@@ -402,6 +402,17 @@ class Trimesh(unittest.TestCase):
         self.assertEqual((rays.tolist(), triangles.tolist()), ([0, 3], first[[0, 3]].tolist()))
         self.assertEqual([len(array) for array in intersector.intersects_id(origins[2:3], directions[2:3], return_locations=True)], [0, 0, 0])
 
+    def test_many_hits(self):
+        """All hits of a ray have locations, and the nearest 20 have ids unless another number is given."""
+        class Stack:
+            vertices = [[x, y, z] for z in range(30) for x, y in ((-1, -1), (1, -1), (0, 1))]
+            faces = np.arange(90).reshape(30, 3)
+        intersector, ray = glint.trimesh.RayMeshIntersector(Stack), ([[0.1, 0.2, -1]], [[0, 0, 1]])
+        for most, expected in ((), 30), ((7,), 7):
+            self.assertEqual([len(array) for array in intersector.intersects_location(*ray, True, *most)], [expected] * 3)
+        for most, expected in ((), 20), ((None,), 30):
+            self.assertEqual([array.tolist() for array in intersector.intersects_id(*ray, True, *most)], [list(range(expected)), [0] * expected])
+
     def test_contains(self):
         points = np.random.default_rng(2).uniform(-0.5, 1.5, (500, 3))
         inside = glint.trimesh.RayMeshIntersector(Mesh).contains_points(points)

@@ -177,13 +177,31 @@ class Errors(unittest.TestCase):
             for name in "glint_tracer_close", "glint_device_close":
                 close = getattr(library, name)
                 stack.enter_context(mock.patch.object(library, name, lambda handle, name=name, close=close: (closed.append(name), close(handle))))
-            scene = glint.Scene(SPHERE)
-            for precision in "single", "double":
-                scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index, precision=precision)
+            scene, other = glint.Scene(SPHERE), glint.Scene(SPHERE)
+            for user, precision in (scene, "single"), (other, "double"):
+                user.trace([[0, 0, -4]], [[0, 0, 1]], device=index, precision=precision)
             with mock.patch.object(library, "glint_trace", lambda *_: 2), self.assertRaises(glint.DeviceError):
                 scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index)
             self.assertEqual(closed, ["glint_tracer_close", "glint_tracer_close", "glint_device_close"])
             self.assertEqual(scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index).object.tolist(), [0])
+
+    def test_warning_as_error(self):
+        """A warning that is an error does not lose the arrays of all hits."""
+        library, freed = glint._c.library, []
+        trace, free = library.glint_trace_all, library.glint_all_hits_free
+
+        def trace_all(*arguments):
+            status = trace(*arguments)
+            arguments[-1]._obj.value = copy_text(b"slow")
+            return status
+        copy_text = ctypes.CDLL(None).strdup
+        copy_text.restype = ctypes.c_void_p
+        with mock.patch.object(library, "glint_trace_all", trace_all), warnings.catch_warnings(), \
+                mock.patch.object(library, "glint_all_hits_free", lambda hits: (freed.append(bool(hits._obj.ray)), free(hits))):
+            warnings.simplefilter("error")
+            with self.assertRaisesRegex(glint.GlintWarning, "slow"):
+                glint.Scene(SPHERE).trace_all([[0, 0, -4]], [[0, 0, 1]])
+        self.assertEqual(freed, [True])
 
     def test_pocl_of_pip(self):
         """PoCL's wheel is found where the system has no driver."""
@@ -202,6 +220,14 @@ class Errors(unittest.TestCase):
         devices = glint.devices()
         self.assertTrue(devices and all(device.index == i and device.name for i, device in enumerate(devices)))
         self.assertRegex(glint.version(), r"^\d+\.\d+\.\d+")
+
+        def list_many(infos, capacity, count, _messages):
+            count._obj.value = 300
+            for i in range(min(capacity, 300)):
+                infos[i].index = i
+            return 0
+        with mock.patch.object(glint._c.library, "glint_devices_list", list_many):
+            self.assertEqual([device.index for device in glint.devices()], list(range(300)))
 
 
 if __name__ == "__main__":

@@ -62,7 +62,9 @@ class Device(NamedTuple):
 
 def devices() -> list[Device]:
     """Lists the devices of all platforms. Raises DeviceError if a platform fails."""
-    infos, count = (_c.DeviceInfo * 256)(), ctypes.c_size_t()
+    count = ctypes.c_size_t()
+    _h.call(_c.library.glint_devices_list, None, 0, ctypes.byref(count))
+    infos = (_c.DeviceInfo * count.value)()
     for info in infos:
         info.size = ctypes.sizeof(_c.DeviceInfo)
     _h.call(_c.library.glint_devices_list, infos, len(infos), ctypes.byref(count))
@@ -102,7 +104,7 @@ class AllHits(NamedTuple):
 
 
 def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any) -> np.ndarray:
-    """Returns a contiguous array of `count` rows, to which a single row or number is repeated, or of any number of rows if it is None."""
+    """Returns a contiguous array. If `count` is given, repeats a single row or number to that many rows."""
     array = np.asarray(array, dtype)
     shape = (count, columns) if columns > 1 else (count,)
     if count is not None:
@@ -154,6 +156,7 @@ class Scene:
         self._handle = _h.Handle(make, _c.library.glint_scene_free)
         self._tracers: dict[tuple[_h.Handle, int, int], _h.Handle] = {}  # by device, precision and lanes
         self._lock = threading.Lock()  # of the tracers; never held during a call of the library, which may wait for a device
+        _h.device_users_add(self)
 
     def __reduce__(self) -> Any:
         raise TypeError("a Scene cannot be copied or pickled")
@@ -274,9 +277,9 @@ class Scene:
         rays = _rays(origins, directions, tmin, tmax)
         found = _c.AllHits(ctypes.sizeof(_c.AllHits))
         most = ctypes.c_size_t(-1) if hits_max is None else _h.uint32("hits_max", hits_max)
-        self._trace(_c.library.glint_trace_all, device, precision, lanes, ctypes.byref(rays), most, ctypes.byref(found))
-        count = found.count
         try:
+            self._trace(_c.library.glint_trace_all, device, precision, lanes, ctypes.byref(rays), most, ctypes.byref(found))
+            count = found.count
             arrays = (_copied(found.ray, (count,), np.uintp), _copied(found.object, (count,), np.uint32),
                       _copied(found.t, (count,), np.float64), _copied(found.normal, (count, 3), np.float64),
                       _copied(found.position, (count, 3), np.float64))
@@ -288,19 +291,19 @@ class Scene:
         """Calls a function that traces. The tracer is kept for later calls with the same settings, unless the device fails."""
         with _h.device_opened(device) as opened:
             key = opened, _precision(precision), _h.uint32("lanes", lanes)
-            try:
+            with self._lock:
+                tracer = self._tracers.get(key)
+            if not tracer:
+                made = self._tracer(*key)
                 with self._lock:
-                    tracer = self._tracers.get(key)
-                if not tracer:
-                    made = self._tracer(*key)
-                    with self._lock:
-                        tracer = self._tracers.setdefault(key, made)
-                _h.call(function, tracer, *arguments)
-            except DeviceError:
-                with self._lock:
-                    dropped = self._tracers  # which are closed after the lock is released
-                    self._tracers = {other: tracer for other, tracer in dropped.items() if other[0] is not opened}
-                raise
+                    tracer = self._tracers.setdefault(key, made)
+            _h.call(function, tracer, *arguments)
+
+    def device_forget(self, device: _h.Handle) -> None:
+        """Closes the tracers of a device, which failed."""
+        with self._lock:
+            dropped = self._tracers  # which are closed after the lock is released
+            self._tracers = {key: tracer for key, tracer in dropped.items() if key[0] is not device}
 
     def _tracer(self, device: _h.Handle, precision: int, lanes: int) -> _h.Handle:
         settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), precision, lanes)

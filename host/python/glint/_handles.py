@@ -83,6 +83,13 @@ def uint32(name: str, value: int) -> int:
 Selector = Union[None, int, str]  #: selects a device as `glint render --device` does; None selects the default
 _opened: dict[Optional[str], Handle] = {}  # the open devices by selector
 _opened_lock = threading.RLock()  # a function that shows warnings may use a device
+_users: weakref.WeakSet[Any] = weakref.WeakSet()  # guarded by the lock
+
+
+def device_users_add(user: Any) -> None:
+    """Adds an object whose `device_forget` is called with each device that fails."""
+    with _opened_lock:
+        _users.add(user)
 
 
 @contextlib.contextmanager
@@ -102,4 +109,7 @@ def device_opened(selector: Selector) -> Iterator[Handle]:
         with _opened_lock:
             if _opened.get(key) is device:
                 del _opened[key]
+            users = list(_users)
+        for user in users:
+            user.device_forget(device)
         raise

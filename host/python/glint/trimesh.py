@@ -1,7 +1,7 @@
 """A drop-in for trimesh.ray: mesh.ray = glint.trimesh.RayMeshIntersector(mesh)."""
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -35,16 +35,18 @@ class RayMeshIntersector:
         return self._scene.occluded(np.asarray(ray_origins, np.float64), np.asarray(ray_directions, np.float64),
                                     precision=self._precision, device=self._device)
 
-    def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True) \
-            -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns the hit points (n, 3), the index of each point's ray, and the index of its triangle."""
-        triangles, rays, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits, return_locations=True)
+    def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True,
+                            max_hits: Optional[int] = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns the hit points (n, 3), the index of each point's ray, and the index of its triangle, of all hits or of the nearest
+        `max_hits` of each ray."""
+        triangles, rays, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits, max_hits, return_locations=True)
         return locations, rays, triangles
 
-    def intersects_id(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True, max_hits: int = 20,
+    def intersects_id(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True, max_hits: Optional[int] = 20,
                       return_locations: bool = False) -> tuple[np.ndarray, ...]:
         """Returns the triangles that rays hit and the indices of these rays, and with `return_locations` the hit points.
-        A ray's hits are sorted by t. If several triangles are hit at the same t, only the first is returned."""
+        A ray's hits are sorted by t. Only the nearest `max_hits` are returned, or all if it is None. If several triangles are hit at the
+        same t, only the first is returned."""
         origins, directions = (np.asarray(array, np.float64) for array in (ray_origins, ray_directions))
         if multiple_hits:
             found = self._scene.trace_all(origins, directions, hits_max=max_hits, device=self._device)
