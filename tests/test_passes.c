@@ -224,7 +224,7 @@ TEST(preview_differs_by_roundings)
 }
 
 // An eye next to a sphere needs the sphere's power, and so a second kernel. An eye that alternates between
-// two places builds each kernel once.
+// two places builds each kernel once. The first launches of each are as small as those of a new one.
 TEST(eye_next_to_a_sphere_builds_two_kernels)
 {
     OwnedScene scene =
@@ -232,18 +232,23 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
                                   "lights: [{point: {position: [0, 9, -9]}}]\n"
                                   "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125,\n"
                                   "  material: {reflection: 0.1}}}]\n"); // as glint.py's SPHERE
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(128, 96, PRECISION_SINGLE);  // more pixels than a first launch
     settings.extra_features = 0;
     settings.moves = true;
+    settings.band_seconds = 100; // no launch takes so long
     MessageList messages = {0};
     Renderer *renderer = probe_renderer(&scene, &settings);
     uint64_t hashes[4];
     double build_seconds[4];
+    size_t launch_counts[4];
     for (size_t i = 0; i < 4; i++) {
         scene.camera.position.z = i % 2 ? 0.3749 : -4;
         assert_true(renderer_move(renderer, &scene, &settings, &messages));
         OwnedFilm expected = film_render(&probe_compute, &scene, &settings, 0);
+        renderer_report_restart(renderer);
         check_render(renderer, &expected, "near or far");
+        launch_counts[i] = renderer_report(renderer)->launches.count;
+        assert_true(launch_counts[i] > 1 && launch_counts[i] == launch_counts[0]);
         hashes[i] = renderer_report(renderer)->kernel_hash;
         build_seconds[i] = renderer_report(renderer)->build_seconds;
     }

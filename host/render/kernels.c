@@ -58,6 +58,7 @@ void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, co
         const KernelVariant other = kernels->other_variant;
         kernels->other_variant = *variant;
         *variant = other;
+        memset(kernels->paces, 0, sizeof kernels->paces);
     }
     if (variant_has(variant, &prelude)) {
         text_free(&prelude);
@@ -65,7 +66,6 @@ void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, co
     } else {
         variant_close(variant, kernels->scene->compute);
         *variant = (KernelVariant){prelude, out_of_line_prelude, options, {{.program = {0}}}};
-        memset(kernels->paces, 0, sizeof kernels->paces);
     }
     for (size_t type = 0; type < KERNEL_COUNT; type++)
         if (variant->slots[type].program.kernel)
