@@ -129,21 +129,6 @@ Pace *pass_pace(Pass *pass, KernelType type)
     return pace;
 }
 
-// Launches the kernel over the place, part by part, with `samples` per pixel.
-static bool place_launch(Pass *pass, KernelType type, const Place *place, uint32_t samples)
-{
-    Pace *pace = pass_pace(pass, type);
-    const RenderSettings *settings = &pass->settings;
-    Place part = {0};
-    while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
-        const double seconds = kernels_launch(&pass->kernels, type, 2, part.first, part.items, part.group);
-        pace_record_launch(pace, place_pixels(&part) * samples, seconds);
-        if (!compute_ok(pass->compute) || (settings->stop && settings->stop(settings->stop_context)))
-            return false;
-    }
-    return true;
-}
-
 static void buffer_clear(Pass *pass, cl_mem buffer, size_t size)
 {
     void *zeros = memory_allocate_zeroed(size, 1);
@@ -164,6 +149,26 @@ static void ray_counts_add(Pass *pass, const BandBuffers *buffers)
     buffer_read(pass->compute, buffers->ray_counts, sizeof counts, counts);
     for (size_t i = 0; i < RAYS_COUNT; i++)
         pass->report->rays[i] += counts[i];
+}
+
+// Launches the kernel over the place, part by part, with `samples` per pixel. The rays of each launch are
+// counted separately, because a counter has 32 bits.
+static bool place_launch(Pass *pass, KernelType type, const BandBuffers *buffers, const Place *place,
+                         uint32_t samples)
+{
+    Pace *pace = pass_pace(pass, type);
+    const RenderSettings *settings = &pass->settings;
+    const bool is_counting = settings->counting && type == KERNEL_RENDER;
+    Place part = {0};
+    while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
+        if (is_counting) buffer_clear(pass, buffers->ray_counts, RAYS_COUNT * sizeof(uint32_t));
+        const double seconds = kernels_launch(&pass->kernels, type, 2, part.first, part.items, part.group);
+        pace_record_launch(pace, place_pixels(&part) * samples, seconds);
+        if (is_counting) ray_counts_add(pass, buffers);
+        if (!compute_ok(pass->compute) || (settings->stop && settings->stop(settings->stop_context)))
+            return false;
+    }
+    return true;
 }
 
 bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uint32_t first, uint32_t last)
@@ -187,10 +192,7 @@ bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uin
         // kernels set the sums and their compensation to 0 at sample 0 only
         if (first > 0) buffer_clear(pass, buffers->film, sums_size);
     }
-    if (pass->settings.counting) buffer_clear(pass, buffers->ray_counts, RAYS_COUNT * sizeof(uint32_t));
-    const bool continues = place_launch(pass, KERNEL_RENDER, place, last - first);
-    if (pass->settings.counting) ray_counts_add(pass, buffers);
-    return continues;
+    return place_launch(pass, KERNEL_RENDER, buffers, place, last - first);
 }
 
 bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs, const Place *place)
@@ -214,5 +216,6 @@ bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned
         kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, pass->sample_offsets);
     flags_clear(pass, buffers->center_flags, place);
     pace_begin_band(pass_pace(pass, type));
-    return place_launch(pass, type, place, type == KERNEL_COVERAGE ? pass->settings.sample_count : 1);
+    return place_launch(pass, type, buffers, place,
+                        type == KERNEL_COVERAGE ? pass->settings.sample_count : 1);
 }
