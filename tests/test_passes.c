@@ -49,6 +49,22 @@ TEST(passes_give_the_bits_of_one_render)
     renderer_close(renderer);
 }
 
+// The last sample of `certified` flags pixels after the AOVs were delivered.
+TEST(passes_flag_the_pixels_of_one_render)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    OwnedScene scene = scene_of_file("tests/scenes/mirror-balls.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
+    settings.sample_count = 3;
+    OwnedFilm expected = film_render(&probe_compute, &scene, &settings, AOV_FLAG);
+    Renderer *renderer = probe_renderer(&scene, &settings);
+    Received received = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOV_FLAG)};
+    assert_true(renderer_accumulate(renderer, AOV_FLAG, band_receive, &received));
+    film_assert_same(&received.film, &expected, "flags of passes");
+    film_free(&received.film);
+    renderer_close(renderer);
+}
+
 // What the first pass of `certified` proves is replayed in double. If the device's buffers are too small for
 // the record, the second pass searches again.
 TEST(replayed_decisions_change_nothing)

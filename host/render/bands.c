@@ -190,6 +190,7 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void 
 {
     Pass *pass = &renderer->passes[PASS_ALL];
     const uint32_t count = pass->settings.sample_count;
+    const unsigned last_layers = AOV_COLOR | (aovs & AOV_FLAG); // the last sample flags pixels
     const BandQueue queue = {.deliver = sink, .context = context};
     PassBands bands = {0};
     double start = clock_seconds(), seconds_of_sample;
@@ -206,7 +207,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void 
         for (size_t i = 0; continues && i < bands.count; i++) {
             PassBand *band = &bands.items[i];
             continues = band_sample(pass, &band->buffers, band->rows, first, end, &queue) &&
-                        band_deliver(pass, &band->buffers, AOV_COLOR, band->rows, end, &queue);
+                        band_deliver(pass, &band->buffers, end < count ? AOV_COLOR : last_layers, band->rows,
+                                     end, &queue);
         }
         seconds_of_sample = (clock_seconds() - start) / (end - first);
     }
