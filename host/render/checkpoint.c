@@ -23,7 +23,7 @@
 
 static const char file_magic[] = "glint checkpoint"; // stored without its null
 static const uint64_t file_format = 3;
-static const double SYNC_SECONDS = 1; // the minimum between two syncs, which are slow
+static const double sync_seconds = 1; // the minimum between two syncs, which are slow
 
 enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16 };
 
@@ -325,7 +325,7 @@ static bool record_write(Checkpoint *checkpoint, const RecordHeader *record, con
         offset += (off_t)size;
     }
     double now = clock_seconds();
-    if (now - checkpoint->synced_seconds < SYNC_SECONDS) return true;
+    if (now - checkpoint->synced_seconds < sync_seconds) return true;
     checkpoint->synced_seconds = now;
     return file_sync(checkpoint->descriptor);
 }

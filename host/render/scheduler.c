@@ -27,11 +27,11 @@
 
 // The default limit for bytes of waiting bands, which usually holds one band per worker
 // (docs/measurements/README.md).
-static const size_t WAITING_BYTES_MIN = 64 << 20, WAITING_BYTES_OF_WORKER = 16 << 20;
+static const size_t waiting_bytes_min = 64 << 20, waiting_bytes_of_worker = 16 << 20;
 
 typedef struct {
-    BandRows rows; // taken and not yet delivered
-    double taken_seconds;
+    BandRows rows; // acquired and not yet delivered
+    double acquired_seconds;
     double rows_per_second; // in the last band; 0 if unknown
     bool is_dropped;
     WorkerShare share;
@@ -46,7 +46,7 @@ struct Scheduler {
     bool is_delivering, has_ended;
     WorkerState *workers;
     size_t active_count;    // workers that are not dropped
-    bool *is_free;          // whether each row is neither taken nor rendered
+    bool *is_free;          // whether each row is neither acquired nor rendered
     uint32_t free_count;    // the number of these rows
     ARRAY_OF(Film) waiting; // copies, which have no layers if the checkpoint has them
     size_t row_bytes;       // memory per row of a waiting band; 0 if none or unknown
@@ -172,7 +172,7 @@ static BandRows rows_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_
     if (rows.row_count == 0) return rows;
     rows_set_free(scheduler, rows, false);
     scheduler->workers[worker].rows = rows;
-    scheduler->workers[worker].taken_seconds = clock_seconds();
+    scheduler->workers[worker].acquired_seconds = clock_seconds();
     return rows;
 }
 
@@ -196,7 +196,7 @@ BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, u
 }
 
 // Passes the next band to the sink. The mutex is not held meanwhile.
-static void band_pass(Scheduler *scheduler, const Film *band)
+static void band_forward(Scheduler *scheduler, const Film *band)
 {
     const uint32_t end = band->first_row + band->height;
     scheduler->is_delivering = true;
@@ -223,7 +223,7 @@ static bool waiting_acquire(Scheduler *scheduler, Film *band)
 }
 
 // Passes the waiting bands up to the first missing row to the sink, unless another thread is doing so.
-static void waiting_pass(Scheduler *scheduler)
+static void waiting_forward(Scheduler *scheduler)
 {
     Film band;
     while (!scheduler->has_ended && !scheduler->is_delivering && waiting_acquire(scheduler, &band)) {
@@ -231,7 +231,7 @@ static void waiting_pass(Scheduler *scheduler)
         if (checkpoint && !checkpoint_read(checkpoint, band.first_row, &band))
             scheduler->has_ended = true;
         else
-            band_pass(scheduler, &band);
+            band_forward(scheduler, &band);
         film_free(&band);
     }
 }
@@ -246,7 +246,7 @@ static void checkpoint_resume(Scheduler *scheduler)
         array_push(scheduler->waiting,
                    ((Film){.first_row = bands[i].first_row, .height = bands[i].row_count}));
     }
-    waiting_pass(scheduler);
+    waiting_forward(scheduler);
 }
 
 Scheduler *scheduler_open(const SchedulerSettings *settings)
@@ -254,9 +254,9 @@ Scheduler *scheduler_open(const SchedulerSettings *settings)
     Scheduler *scheduler = memory_allocate_zeroed(1, sizeof *scheduler);
     scheduler->settings = *settings;
     if (settings->waiting_bytes_max == 0) {
-        const size_t of_workers = settings->worker_count * WAITING_BYTES_OF_WORKER;
+        const size_t of_workers = settings->worker_count * waiting_bytes_of_worker;
         scheduler->settings.waiting_bytes_max =
-            of_workers > WAITING_BYTES_MIN ? of_workers : WAITING_BYTES_MIN;
+            of_workers > waiting_bytes_min ? of_workers : waiting_bytes_min;
     }
     scheduler->start_seconds = clock_seconds();
     scheduler->active_count = settings->worker_count;
@@ -291,7 +291,7 @@ static void band_keep(Scheduler *scheduler, const Film *band)
 
 static void rows_done(WorkerState *worker)
 {
-    double seconds = clock_seconds() - worker->taken_seconds;
+    double seconds = clock_seconds() - worker->acquired_seconds;
     worker->share.rows += worker->rows.row_count;
     worker->share.bands++;
     worker->share.busy_seconds += seconds;
@@ -306,11 +306,11 @@ bool scheduler_deliver(Scheduler *scheduler, size_t worker, const Film *band)
     rows_done(&scheduler->workers[worker]);
     if (!is_kept) scheduler->has_ended = true;
     if (!scheduler->has_ended && is_next(scheduler, band))
-        band_pass(scheduler, band);
+        band_forward(scheduler, band);
     else if (!scheduler->has_ended)
         band_keep(scheduler, band);
     scheduler->workers[worker].rows = (BandRows){0};
-    waiting_pass(scheduler);
+    waiting_forward(scheduler);
     bool continues = !scheduler->has_ended;
     pthread_cond_broadcast(&scheduler->changed);
     pthread_mutex_unlock(&scheduler->mutex);
