@@ -26,7 +26,7 @@ static SceneLayout scene_layout(const DeviceScene *scene, const CompiledScene *c
 }
 
 // The size of the largest buffer that the host and the arena's offsets can address.
-static const uint64_t BUFFER_BYTES_MAX =
+static const uint64_t buffer_bytes_max =
     SIZE_MAX / ARENA_UNIT < UINT32_MAX ? SIZE_MAX : (uint64_t)UINT32_MAX * ARENA_UNIT;
 
 bool device_scene_fits(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages)
@@ -36,7 +36,7 @@ bool device_scene_fits(const DeviceScene *scene, const CompiledScene *compiled, 
     const bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
     const uint64_t memory = is_known ? device->memory_bytes : UINT64_MAX,
                    reported = is_known ? device->largest_buffer_bytes : UINT64_MAX,
-                   most = reported < BUFFER_BYTES_MAX ? reported : BUFFER_BYTES_MAX;
+                   most = reported < buffer_bytes_max ? reported : buffer_bytes_max;
     uint64_t sum = 0, largest = 0;
     for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
         sum += layout.buffer_sizes[i];
@@ -114,7 +114,7 @@ void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScen
             scenes[i]->upload_seconds += clock_seconds() - start;
         }
         compiled->changed[type] = false;
-        if (count > 0 && scenes[0]->moves && !array_ignores_eye(type)) continue;
+        if (scenes[0]->moves && !array_ignores_eye(type)) continue;
         free(compiled->arrays[type].items);
         compiled->arrays[type].items = NULL;
     }
@@ -129,7 +129,6 @@ void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScen
         compiled->textures = NULL; // scenes[0] has them; only a scene that is alone reads these two
         compiled->instances = NULL;
     }
-    if (count == 0) compiled_scene_free(compiled);
 }
 
 void device_scene_release(DeviceScene *scene)

@@ -18,7 +18,7 @@ typedef struct {
     uint64_t begins[FLAT_COUNT], array_sizes[FLAT_COUNT], buffer_sizes[SCENE_BUFFER_COUNT];
 } SceneLayout;
 
-// Starts as zero except for the first members and for `hash`, which is HASH_START.
+// Starts as zero except for the members before `compiled`, with HASH_START as `hash`.
 typedef struct {
     Compute *compute;
     bool is_double;         // whether the structs are in double
@@ -36,9 +36,10 @@ typedef struct {
 // arena's offsets can address, or if its buffers would exceed the memory that the device reports. If the
 // device reports none, creating the buffers may fail.
 bool device_scene_fits(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages);
-// Uploads the arrays of the compiled scene that have changed to devices that read the same arrays and have
-// room for them. Frees each array once all have it, unless the scene moves, which is then alone, so that at
-// most one array is in memory twice. Takes ownership of the compiled scene, which may be scenes[0]->compiled.
+// Uploads the arrays of the compiled scene that have changed to devices, at least one, that read the same
+// arrays and have room for them. Frees each array once all have it, unless the scene moves, which is then
+// alone, so that at most one array is in memory twice. Takes ownership of the compiled scene, which may be
+// scenes[0]->compiled.
 void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScene *compiled);
 // Frees the memory that the scene takes on the device and on the host.
 void device_scene_release(DeviceScene *scene);

@@ -146,7 +146,7 @@ void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *comp
     DeviceScene **scenes = memory_allocate(count, sizeof *scenes);
     for (size_t i = 0; i < count; i++)
         scenes[i] = &passes[i]->scene;
-    if (count > 0) stage_begin(passes[0]->settings.stage, "uploading the scene", NULL, 0);
+    stage_begin(passes[0]->settings.stage, "uploading the scene", NULL, 0);
     device_scenes_upload(scenes, count, compiled);
     for (size_t i = 0; i < count; i++)
         scene_changed(passes[i]);

@@ -28,8 +28,8 @@ void pass_open(Pass *pass, PixelPass type, Compute *compute, const RenderSetting
 void pass_release_scene(Pass *pass);
 void pass_close(Pass *pass);
 
-// Uploads the compiled scene to passes of its variant on devices that have room for it, and takes ownership
-// of it. A pass whose settings have `moves` is alone and keeps the arrays.
+// Uploads the compiled scene to passes of its variant, at least one, on devices that have room for it, and
+// takes ownership of it. A pass whose settings have `moves` is alone and keeps the arrays.
 void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *compiled);
 // Compiles another scene into *fresh or, if the settings have `moves`, moves the pass's arrays on the host.
 // Returns false with a message, and nothing to free, if the scene cannot be compiled or does not fit the

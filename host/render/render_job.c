@@ -52,7 +52,11 @@ static bool variants_compile(const RendererSet *set, const Scene *scene, const R
             compiles = scene_compile(&compiled, scene, &compiling, messages);
             if (!compiles) break;
             if (remote) remote->send_scene(remote->context, variant, &compiled);
-            passes_receive_scene(receivers, receivers_find(receivers, set, variant, &compiled), &compiled);
+            const size_t count = receivers_find(receivers, set, variant, &compiled);
+            if (count > 0)
+                passes_receive_scene(receivers, count, &compiled);
+            else
+                compiled_scene_free(&compiled);
         }
     free(receivers);
     return compiles;
@@ -73,20 +77,6 @@ bool renderers_open(const RendererSet *set, const Scene *scene, const RenderSett
         set->renderers[i] = NULL;
     }
     return compiles;
-}
-
-Renderer *renderer_reopen(Renderer *earlier, Compute *compute, const Scene *scene,
-                          const RenderSettings *settings, MessageList *messages)
-{
-    const RendererSet set = {&earlier, &compute, messages, 1};
-    renderers_open(&set, scene, settings, NULL, messages);
-    return earlier;
-}
-
-Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
-                        MessageList *messages)
-{
-    return renderer_reopen(NULL, compute, scene, settings, messages);
 }
 
 typedef struct {
@@ -187,11 +177,4 @@ bool render_job_run(const RenderJob *job)
         share_set(&remote->shares[i], &shares[count + i], is_part);
     free(shares);
     return whole;
-}
-
-bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
-{
-    const RenderJob job = {
-        .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
-    return render_job_run(&job) && compute_ok(renderer->passes[PASS_ALL].compute);
 }

@@ -4,9 +4,24 @@
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
 #include "host/render/arithmetic.h"
+#include "host/render/render_job.h"
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
 #include <string.h>
+
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                        MessageList *messages)
+{
+    return renderer_reopen(NULL, compute, scene, settings, messages);
+}
+
+Renderer *renderer_reopen(Renderer *earlier, Compute *compute, const Scene *scene,
+                          const RenderSettings *settings, MessageList *messages)
+{
+    const RendererSet set = {&earlier, &compute, messages, 1};
+    renderers_open(&set, scene, settings, NULL, messages);
+    return earlier;
+}
 
 Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
                               MessageList *messages)
@@ -48,7 +63,10 @@ bool renderer_receive_scene(Renderer *renderer, PixelPass pass, CompiledScene *c
 {
     Pass *receiver = &renderer->passes[pass];
     const bool fits = device_scene_fits(&receiver->scene, compiled, messages);
-    passes_receive_scene(&receiver, fits, compiled);
+    if (fits)
+        passes_receive_scene(&receiver, 1, compiled);
+    else
+        compiled_scene_free(compiled);
     return fits && compute_check_reference(renderer->passes[PASS_ALL].compute);
 }
 
@@ -66,6 +84,13 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
         else
             compiled_scene_free(&fresh[i]);
     return fits && compute_check_reference(compute);
+}
+
+bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
+{
+    const RenderJob job = {
+        .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
+    return render_job_run(&job) && compute_ok(renderer->passes[PASS_ALL].compute);
 }
 
 uint64_t renderer_scene_hash(const Renderer *renderer)
