@@ -1,6 +1,6 @@
 // Tests how long launches take if parts of an image have very different costs. Only the pace is tested,
 // without a device or a clock.
-#include "host/render/place.h"
+#include "host/render/launch_range.h"
 #include "tests/check.h"
 
 enum { WIDTH = 640, HEIGHT = 360, ROWS_MAX = 512, FIRST_LAUNCH = 4096, GROWTH_MAX = 4 };
@@ -13,10 +13,10 @@ typedef struct {
     uint64_t samples, largest_first, last_launch;
 } Run;
 
-// Launches rows of the image, as band_render does, with whole rows as groups. Those from `glass_row` on are
-// glass.
-static void pass_run(Run *run, Pace *pace, uint32_t first_row, uint32_t rows, uint32_t samples,
-                     uint32_t glass_row)
+// Launches rows of the image, as samples_render does, with whole rows as groups. Those from `glass_row` on
+// are glass.
+static void sweep_run(Run *run, Pace *pace, uint32_t first_row, uint32_t rows, uint32_t samples,
+                      uint32_t glass_row)
 {
     for (uint32_t done = 0, part; done < rows; done += part) {
         const uint64_t most = pace_launch_samples(pace);
@@ -49,9 +49,9 @@ static Run run(uint32_t sample_count, uint32_t glass_row)
         if (rows > HEIGHT - row) rows = HEIGHT - row;
         pace_begin_band(&pace);
         for (uint32_t done = 0; done < sample_count;) {
-            const uint32_t samples = pace_begin_pass(&pace, rows * WIDTH, sample_count - done);
+            const uint32_t samples = pace_begin_sweep(&pace, rows * WIDTH, sample_count - done);
             assert_true(samples >= 1 && samples <= sample_count - done);
-            pass_run(&run, &pace, row, (uint32_t)rows, samples, glass_row);
+            sweep_run(&run, &pace, row, (uint32_t)rows, samples, glass_row);
             done += samples;
         }
         row += (uint32_t)rows;
@@ -95,16 +95,16 @@ TEST(launches_begin_small)
     Pace pace = {.target_seconds = target};
     pace_begin_band(&pace);
     assert_int_equal(pace_launch_samples(&pace), FIRST_LAUNCH);
-    assert_int_equal(pace_begin_pass(&pace, 1000, 1000), FIRST_LAUNCH / 1000);
-    assert_int_equal(pace_begin_pass(&pace, 1 << 18, 1000), 1);
-    assert_int_equal(pace_begin_pass(&pace, 1, 5000), 1024);
-    // a first pass of one sample per pixel, then four times as many per pass, up to the target
+    assert_int_equal(pace_begin_sweep(&pace, 1000, 1000), FIRST_LAUNCH / 1000);
+    assert_int_equal(pace_begin_sweep(&pace, 1 << 18, 1000), 1);
+    assert_int_equal(pace_begin_sweep(&pace, 1, 5000), 1024);
+    // a first sweep of one sample per pixel, then four times as many per sweep, up to the target
     static const uint32_t expected[] = {1, 4, 16, 50, 29};
     for (int band = 0; band < 3; band++) {
         pace_record_launch(&pace, 1900000, 19e5 * cheap);
         pace_begin_band(&pace);
         for (uint32_t i = 0, left = 100; i < 5; i++) {
-            const uint32_t samples = pace_begin_pass(&pace, 100000, left);
+            const uint32_t samples = pace_begin_sweep(&pace, 100000, left);
             assert_int_equal(samples, expected[i]);
             pace_record_launch(&pace, (uint64_t)100000 * samples, 100000 * cheap * samples);
             left -= samples;
@@ -114,7 +114,7 @@ TEST(launches_begin_small)
     pace_begin_band(&pace);
     pace_record_launch(&pace, 6400000, 64e5 * 1e-12);
     pace_begin_band(&pace);
-    assert_int_equal(pace_begin_pass(&pace, 100, 64), 1);
+    assert_int_equal(pace_begin_sweep(&pace, 100, 64), 1);
 }
 
 // The device is kept busy where that makes launches longer than the target, but not in the first ones.
@@ -144,9 +144,9 @@ TEST(plain_images_have_few_launches)
     }
 }
 
-// Every pixel is in one part of a place, no part is larger than allowed, and rows that are too wide are
+// Every pixel is in one part of a range, no part is larger than allowed, and rows that are too wide are
 // split.
-TEST(parts_cover_a_place)
+TEST(parts_cover_a_range)
 {
     static const uint32_t sizes[][2] = {{1, 1}, {3840, 2160}, {3840, 8}, {1921, 1083}, {7, 500}, {100000, 3}};
     static const size_t groups[] = {1, 8};
@@ -155,21 +155,21 @@ TEST(parts_cover_a_place)
         for (size_t j = 0; j < 4; j++) {
             const TileShape item = item_shapes[j / 2];
             const size_t side = groups[j % 2];
-            const Place whole = {.band = {{0, 0, sizes[i][0], sizes[i][1]}},
-                                 .item = item,
-                                 .items = {(sizes[i][0] + item.width - 1) / item.width,
-                                           (sizes[i][1] + item.height - 1) / item.height},
-                                 .group = {side, side}};
+            const LaunchRange whole = {.band = {{0, 0, sizes[i][0], sizes[i][1]}},
+                                       .item = item,
+                                       .items = {(sizes[i][0] + item.width - 1) / item.width,
+                                                 (sizes[i][1] + item.height - 1) / item.height},
+                                       .group = {side, side}};
             const uint64_t group_pixels = (uint64_t)side * side * item.width * item.height;
             uint64_t covered = 0, most = FIRST_LAUNCH;
             size_t column = 0, row = 0;
-            for (Place part = {0}; place_next(&part, &whole, most); most *= GROWTH_MAX) {
+            for (LaunchRange part = {0}; launch_range_next(&part, &whole, most); most *= GROWTH_MAX) {
                 assert_int_equal(part.first[0], column);
                 assert_int_equal(part.first[1], row);
                 assert_int_equal(part.first[0] % side, 0);
-                assert_true(place_pixels(&part) >= 1 &&
-                            place_pixels(&part) <= (most > group_pixels ? most : group_pixels));
-                covered += place_pixels(&part);
+                assert_true(launch_range_pixels(&part) >= 1 &&
+                            launch_range_pixels(&part) <= (most > group_pixels ? most : group_pixels));
+                covered += launch_range_pixels(&part);
                 column += part.items[0];
                 if (column < whole.items[0]) continue;
                 column = 0;

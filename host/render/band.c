@@ -6,9 +6,7 @@
 #include <stdlib.h>
 
 // Holds a sample of 1280x720 pixels if rays are refracted (RECORDED_NODES_OF in kernels/types.h).
-static const uint64_t RECORDS_SIZE_MAX = 1 << 27; // in bytes
-
-enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
+static const uint64_t most_record_bytes = 1 << 27;
 
 Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count)
 {
@@ -20,23 +18,19 @@ Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count)
                   .real_size = pass_scalar_size(pass)};
 }
 
-size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
+size_t band_film_layout(const Film *film, unsigned aovs, BandBuffers *buffers)
 {
     // a kernel fills all of its layers, but computes shadows only on request
     const unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) |
                             (aovs & AOVS_OF_SAMPLES ? AOVS_OF_SAMPLES : 0u) |
                             (aovs & (AOVS_OF_PATH | AOV_FLAG));
     size_t end = (size_t)padded_size(2 * film_layer_size(film, LAYER_COLOR)); // with its compensation
-    if (buffers) {
-        buffers->layers = filled;
-        buffers->layer_sizes[LAYER_COLOR] = film_layer_size(film, LAYER_COLOR);
-    }
+    buffers->layers = filled;
+    buffers->layer_sizes[LAYER_COLOR] = film_layer_size(film, LAYER_COLOR);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (layer == LAYER_COLOR || !layer_in(filled, layer)) continue;
-        if (buffers) {
-            buffers->layer_begins[layer] = end;
-            buffers->layer_sizes[layer] = film_layer_size(film, layer);
-        }
+        buffers->layer_begins[layer] = end;
+        buffers->layer_sizes[layer] = film_layer_size(film, layer);
         if (layer != LAYER_SHADOW || aovs & AOV_SHADOW)
             end += (size_t)padded_size(film_layer_size(film, layer));
     }
@@ -54,17 +48,17 @@ static bool pass_records(Pass *pass)
 }
 
 // Returns how many bytes the records of a sample take.
-static size_t records_sample_size(const Pass *pass, const Place *place)
+static size_t records_sample_size(const Pass *pass, const LaunchRange *range)
 {
     const size_t nodes = RECORDED_NODES_OF(pass->scene.compiled.features & FEATURE_TRANSMISSION);
-    return 32 * place_flag_words(place) * nodes * RECORD_WORDS * sizeof(uint32_t);
+    return 32 * launch_range_flag_words(range) * nodes * RECORD_WORDS * sizeof(uint32_t);
 }
 
 // Returns how many bytes at most may record ray trees. They are behind the film in its buffer.
 static size_t records_size_max(const Pass *pass, size_t film_size)
 {
     const Device *device = pass->compute->device;
-    uint64_t most = RECORDS_SIZE_MAX;
+    uint64_t most = most_record_bytes;
     if (device->memory_bytes > 0 && device->memory_bytes / 32 < most) most = device->memory_bytes / 32;
     if (device->largest_buffer_bytes == 0) return (size_t)most;
     const uint64_t left =
@@ -72,32 +66,32 @@ static size_t records_size_max(const Pass *pass, size_t film_size)
     return (size_t)(left < most ? left : most);
 }
 
-void band_record(Pass *pass, BandBuffers *buffers, const Place *place)
+void band_record(Pass *pass, BandBuffers *buffers, const LaunchRange *range)
 {
     const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
-                 fitting = buffers->records_size / records_sample_size(pass, place);
-    buffers->records.s[0] = (uint32_t)(32 * place_flag_words(place));
-    buffers->records.s[1] = pass->settings.first_sample;
-    buffers->records.s[2] = (uint32_t)(fitting < samples ? fitting : samples);
+                 fitting = buffers->records_size / records_sample_size(pass, range);
+    buffers->records.slots = (uint32_t)(32 * launch_range_flag_words(range));
+    buffers->records.first_sample = pass->settings.first_sample;
+    buffers->records.samples = (uint32_t)(fitting < samples ? fitting : samples);
 }
 
 void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film, bool records)
 {
     buffers->rows = film.height;
     const bool is_list = pass->type != PASS_ALL;
-    const Place place = band_place(pass, (BandRows){0, film.height});
-    const size_t film_size = band_film_size(&film, aovs, buffers);
+    const LaunchRange range = launch_range_of_rows(pass, (BandRows){0, film.height});
+    const size_t film_size = band_film_layout(&film, aovs, buffers);
     if (records && pass_records(pass)) {
         const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
-                     needed = samples * records_sample_size(pass, &place),
+                     needed = samples * records_sample_size(pass, &range),
                      most = records_size_max(pass, film_size);
         buffers->records_size = needed < most ? needed : most;
-        buffers->records.s[3] = (uint32_t)(film_size / ARENA_UNIT);
+        buffers->records.begin = (uint32_t)(film_size / ARENA_UNIT);
     }
     buffers->film = buffer_pool_acquire(&pass->pool, pass->compute, film_size + buffers->records_size);
     buffers->ray_counts = buffer_pool_acquire(&pass->pool, pass->compute, RAYS_COUNT * sizeof(uint32_t));
     const size_t words = is_list           ? (LIST_WORDS + 1) * film_pixel_count(&film)
-                         : pass->certifies ? place_flag_words(&place)
+                         : pass->certifies ? launch_range_flag_words(&range)
                                            : 0;
     buffers->flags = buffer_pool_acquire(&pass->pool, pass->compute, words * sizeof(uint32_t));
     buffers->center_flags =
@@ -118,17 +112,6 @@ void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags
     return pass_map(pass, buffers->film, buffers->layer_begins[layer], buffers->layer_sizes[layer], access);
 }
 
-Pace *pass_pace(Pass *pass, KernelType type)
-{
-    const RenderSettings *settings = &pass->settings;
-    const TileShape group = group_shape(pass);
-    Pace *pace = &pass->kernels.paces[type];
-    pace->target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1;
-    pace->samples_min =
-        (double)GROUPS_OF_UNIT_MIN * pass->compute->device->compute_units * group.width * group.height;
-    return pace;
-}
-
 static void buffer_clear(Pass *pass, cl_mem buffer, size_t size)
 {
     void *zeros = memory_allocate_zeroed(size, 1);
@@ -136,11 +119,11 @@ static void buffer_clear(Pass *pass, cl_mem buffer, size_t size)
     free(zeros);
 }
 
-// Clears the flags of a band, which kernels only set.
-static void flags_clear(Pass *pass, cl_mem flags, const Place *place)
+// Clears the bits of uncertain pixels, which kernels only set.
+static void uncertain_bits_clear(Pass *pass, cl_mem flags, const LaunchRange *range)
 {
     if (pass->certifies && pass->type == PASS_ALL)
-        buffer_clear(pass, flags, place_flag_words(place) * sizeof(uint32_t));
+        buffer_clear(pass, flags, launch_range_flag_words(range) * sizeof(uint32_t));
 }
 
 static void ray_counts_add(Pass *pass, const BandBuffers *buffers)
@@ -151,19 +134,19 @@ static void ray_counts_add(Pass *pass, const BandBuffers *buffers)
         pass->report->rays[i] += counts[i];
 }
 
-// Launches the kernel over the place, part by part, with `samples` per pixel. The rays of each launch are
+// Launches the kernel over the range, part by part, with `samples` per pixel. The rays of each launch are
 // counted separately, because a counter has 32 bits.
-static bool place_launch(Pass *pass, KernelType type, const BandBuffers *buffers, const Place *place,
+static bool range_launch(Pass *pass, KernelType type, const BandBuffers *buffers, const LaunchRange *range,
                          uint32_t samples)
 {
-    Pace *pace = pass_pace(pass, type);
+    Pace *pace = &pass->kernels.paces[type];
     const RenderSettings *settings = &pass->settings;
     const bool is_counting = settings->counting && type == KERNEL_RENDER;
-    Place part = {0};
-    while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
+    LaunchRange part = {0};
+    while (launch_range_next(&part, range, pace_launch_samples(pace) / samples)) {
         if (is_counting) buffer_clear(pass, buffers->ray_counts, RAYS_COUNT * sizeof(uint32_t));
         const double seconds = kernels_launch(&pass->kernels, type, 2, part.first, part.items, part.group);
-        pace_record_launch(pace, place_pixels(&part) * samples, seconds);
+        pace_record_launch(pace, launch_range_pixels(&part) * samples, seconds);
         if (is_counting) ray_counts_add(pass, buffers);
         if (!compute_ok(pass->compute) || (settings->stop && settings->stop(settings->stop_context)))
             return false;
@@ -171,31 +154,49 @@ static bool place_launch(Pass *pass, KernelType type, const BandBuffers *buffers
     return true;
 }
 
-bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uint32_t first, uint32_t last)
+// Renders samples first..last-1 of the range. Returns false if the device failed or settings.stop ended the
+// render.
+static bool sweep_render(Pass *pass, const BandBuffers *buffers, const LaunchRange *range, uint32_t first,
+                         uint32_t last)
 {
     Compute *compute = pass->compute;
     cl_kernel kernel = kernels_get(&pass->kernels, KERNEL_RENDER);
     const uint32_t cell = settings_cell(&pass->settings);
-    const size_t sums_size = (size_t)2 * 3 * place->band.s[2] * place->band.s[3] * pass_scalar_size(pass);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, pass->sample_offsets);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof place->band, &place->band);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof first, &first);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof last, &last);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 5, buffers->ray_counts);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->flags);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 9, sizeof buffers->records, &buffers->records);
+    const size_t sums_size = (size_t)2 * 3 * range->band.s[2] * range->band.s[3] * pass_scalar_size(pass);
+    cl_uint argument = SCENE_ARGUMENT_COUNT;
+    kernel_buffer(compute, kernel, argument++, pass->sample_offsets);
+    kernel_buffer(compute, kernel, argument++, buffers->film);
+    kernel_argument(compute, kernel, argument++, sizeof range->band, &range->band);
+    kernel_argument(compute, kernel, argument++, sizeof first, &first);
+    kernel_argument(compute, kernel, argument++, sizeof last, &last);
+    kernel_buffer(compute, kernel, argument++, buffers->ray_counts);
+    kernel_argument(compute, kernel, argument++, sizeof cell, &cell);
+    kernel_buffer(compute, kernel, argument++, buffers->flags);
+    kernel_buffer(compute, kernel, argument++, buffers->band_film);
+    kernel_argument(compute, kernel, argument, sizeof buffers->records, &buffers->records);
     if (first == pass->settings.first_sample) {
-        flags_clear(pass, buffers->flags, place);
+        uncertain_bits_clear(pass, buffers->flags, range);
         // kernels set the sums and their compensation to 0 at sample 0 only
         if (first > 0) buffer_clear(pass, buffers->film, sums_size);
     }
-    return place_launch(pass, KERNEL_RENDER, buffers, place, last - first);
+    return range_launch(pass, KERNEL_RENDER, buffers, range, last - first);
 }
 
-bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs, const Place *place)
+bool samples_render(Pass *pass, const BandBuffers *buffers, const LaunchRange *range, uint32_t first,
+                    uint32_t end, const BandQueue *queue)
+{
+    Pace *pace = &pass->kernels.paces[KERNEL_RENDER];
+    pace_begin_band(pace);
+    for (uint32_t samples; first < end; first += samples) {
+        samples = pace_begin_sweep(pace, launch_range_pixels(range), end - first);
+        if (!sweep_render(pass, buffers, range, first, first + samples)) return false;
+        if (queue && queue->has_ended && queue->has_ended(queue->context)) return false;
+    }
+    return true;
+}
+
+bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs,
+               const LaunchRange *range)
 {
     Compute *compute = pass->compute;
     cl_kernel kernel = kernels_get(&pass->kernels, type);
@@ -203,19 +204,17 @@ bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned
 #define OFFSET_SET(NAME, name, ...)                                                                          \
     offsets.name = (unsigned)(buffers->layer_begins[LAYER_##NAME] / ARENA_UNIT);
     LAYER_LIST(OFFSET_SET)
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof place->band, &place->band);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
     const bool is_list = pass->type != PASS_ALL;
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
-                  is_list ? buffers->flags : buffers->center_flags);
     const cl_uint shadow_count = aovs & AOV_SHADOW ? pass_light_count(pass) : 0;
-    if (type == KERNEL_AOV)
-        kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
-    if (type == KERNEL_COVERAGE)
-        kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, pass->sample_offsets);
-    flags_clear(pass, buffers->center_flags, place);
-    pace_begin_band(pass_pace(pass, type));
-    return place_launch(pass, type, buffers, place,
+    cl_uint argument = SCENE_ARGUMENT_COUNT;
+    kernel_argument(compute, kernel, argument++, sizeof range->band, &range->band);
+    kernel_buffer(compute, kernel, argument++, buffers->film);
+    kernel_argument(compute, kernel, argument++, sizeof offsets, &offsets);
+    kernel_buffer(compute, kernel, argument++, is_list ? buffers->flags : buffers->center_flags);
+    if (type == KERNEL_AOV) kernel_argument(compute, kernel, argument, sizeof shadow_count, &shadow_count);
+    if (type == KERNEL_COVERAGE) kernel_buffer(compute, kernel, argument, pass->sample_offsets);
+    uncertain_bits_clear(pass, buffers->center_flags, range);
+    pace_begin_band(&pass->kernels.paces[type]);
+    return range_launch(pass, type, buffers, range,
                         type == KERNEL_COVERAGE ? pass->settings.sample_count : 1);
 }

@@ -1,7 +1,15 @@
 // Renders the pixels of one launch, a band of rows or a list, into the device's buffers.
 #pragma once
 
-#include "host/render/place.h"
+#include "host/render/launch_range.h"
+#include "host/render/scheduler.h"
+
+// The records of a band's ray trees, as kernels read them from a uint4 (kernels/shading/decisions.h).
+typedef struct {
+    uint32_t slots, first_sample, samples;
+    uint32_t begin; // offset in the film's buffer, in ARENA_UNITs
+} BandRecords;
+_Static_assert(sizeof(BandRecords) == sizeof(cl_uint4), "kernels read it as a vector");
 
 typedef struct {
     uint32_t rows;
@@ -15,17 +23,15 @@ typedef struct {
     // samples.
     cl_mem flags;
     cl_mem center_flags; // the same bits for the AOVs' rays
-    cl_mem band_film;    // in a list, where its colors are to go, or NULL
-    // The records of ray trees (kernels/shading/decisions.h), behind the film: slots, first sample, samples,
-    // and where they begin, in ARENA_UNITs. In a list, those of its band.
-    cl_uint4 records;
+    cl_mem band_film;    // in a list, receives its colors, or NULL
+    BandRecords records; // behind the film; in a list, those of its band
     size_t records_size;
     RerenderCounts rerenders; // since the band's last delivery
 } BandBuffers;
 
-// Returns the size of the buffer for a film's color and the layers that the kernels of these AOVs fill.
-// Unless `buffers` is NULL, its `layers`, `layer_begins` and `layer_sizes` are set.
-size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
+// Sets the `layers`, `layer_begins` and `layer_sizes` of the buffer for a film's color and the layers that
+// the kernels of these AOVs fill. Returns the buffer's size.
+size_t band_film_layout(const Film *film, unsigned aovs, BandBuffers *buffers);
 
 // Provides the buffers for as many pixels as the film has. band_buffers_close keeps them for later bands.
 // With `records`, they have room to record ray trees.
@@ -39,17 +45,16 @@ void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags
 // Returns the description of the film of these rows, with no layers.
 Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count);
 
-// Returns the pace of a kernel's launches, with the target of the settings.
-Pace *pass_pace(Pass *pass, KernelType type);
-
-// Arranges the records for the first of the place's samples, as many as fit. Call it before the first of them
+// Arranges the records for the first of the range's samples, as many as fit. Call it before the first of them
 // is rendered.
-void band_record(Pass *pass, BandBuffers *buffers, const Place *place);
+void band_record(Pass *pass, BandBuffers *buffers, const LaunchRange *range);
 
-// Renders samples first..last-1 of the place in launches whose size the kernel's pace decides. Returns false
-// if the device failed or settings.stop ended the render.
-bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uint32_t first, uint32_t last);
+// Renders samples first..end-1 of the range in launches whose size the kernel's pace decides. Returns false
+// if the device failed, or if settings.stop or the queue, which may be NULL, ended the render.
+bool samples_render(Pass *pass, const BandBuffers *buffers, const LaunchRange *range, uint32_t first,
+                    uint32_t end, const BandQueue *queue);
 
 // Launches a kernel that fills its AOVs (kernels/aovs.h) in launches whose size the kernel's pace decides.
 // Returns false if the device failed or settings.stop ended the render.
-bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs, const Place *place);
+bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs,
+               const LaunchRange *range);

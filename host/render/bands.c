@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double PASS_SECONDS = 0.1; // the approximate duration of a pass of renderer_accumulate
+static const double round_seconds = 0.1; // the approximate duration of a round of renderer_accumulate
 
 enum { BAND_BYTES_MAX = 4 << 20 }; // color and shadow, the one layer that grows with the lights
 
@@ -84,9 +84,11 @@ static uint32_t rows_max(Pass *pass, unsigned aovs)
     const size_t step = group_shape(pass).height;
     rows = rows < step ? step : rows - rows % step;
     // the film fits one buffer, even where all of its pixels are re-rendered in double precision
+    BandBuffers layout = {0};
+    const size_t row_size = band_film_layout(&row, aovs, &layout);
     for (; pass; pass = pass_next(pass)) {
         const uint64_t largest = pass->compute->device->largest_buffer_bytes,
-                       fitting = largest / (2 * band_film_size(&row, aovs, NULL));
+                       fitting = largest / (2 * row_size);
         if (largest > 0 && rows > fitting)
             rows = (size_t)(fitting > step ? fitting - fitting % step : fitting);
     }
@@ -98,18 +100,10 @@ static uint32_t rows_max(Pass *pass, unsigned aovs)
 static bool band_sample(Pass *pass, BandBuffers *buffers, BandRows rows, uint32_t first, uint32_t end,
                         const BandQueue *queue)
 {
-    Pace *pace = pass_pace(pass, KERNEL_RENDER);
-    const Place place = band_place(pass, rows);
-    bool continues = true;
-    pace_begin_band(pace);
-    if (first == pass->settings.first_sample) band_clear_flags(pass, buffers, rows);
-    if (buffers->records_size > 0) band_record(pass, buffers, &place);
-    while (continues && first < end) {
-        const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
-        continues = band_render(pass, buffers, &place, first, first + samples) &&
-                    !(queue->has_ended && queue->has_ended(queue->context));
-        first += samples;
-    }
+    const LaunchRange range = launch_range_of_rows(pass, rows);
+    if (first == pass->settings.first_sample) flag_layer_clear(pass, buffers, rows);
+    if (buffers->records_size > 0) band_record(pass, buffers, &range);
+    bool continues = samples_render(pass, buffers, &range, first, end, queue);
     if (continues && pass->certifies && end == samples_end(&pass->settings))
         continues = band_rerender(pass, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
     return continues && compute_ok(pass->compute);
@@ -118,14 +112,14 @@ static bool band_sample(Pass *pass, BandBuffers *buffers, BandRows rows, uint32_
 // Traces rays for the AOVs. Returns false if the device failed or the render is stopped.
 static bool band_fill_aovs(Pass *pass, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
-    const Place place = band_place(pass, rows);
+    const LaunchRange range = launch_range_of_rows(pass, rows);
     const struct {
         KernelType type;
         unsigned layers;
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}, {KERNEL_COVERAGE, AOVS_OF_SAMPLES}};
     for (size_t i = 0; i < COUNT_OF(fills); i++) {
         if (!(aovs & fills[i].layers)) continue;
-        if (!band_fill(pass, fills[i].type, buffers, aovs, &place)) return false;
+        if (!band_fill(pass, fills[i].type, buffers, aovs, &range)) return false;
         if (pass->certifies && !band_rerender(pass, fills[i].type, fills[i].layers, buffers, aovs, rows))
             return false;
     }
@@ -142,7 +136,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     BandBuffers buffers = {0};
     band_buffers_open(&buffers, pass, aovs, film_of_rows(pass, 0, rows_max(pass, aovs)), true);
     kernels_get(&pass->kernels, KERNEL_RENDER); // builds it before rows wait for it
-    Pace *pace = pass_pace(pass, KERNEL_RENDER);
+    Pace *pace = &pass->kernels.paces[KERNEL_RENDER];
     pace_begin_band(pace); // the last render's band may belong to another scene or size
     bool continues = compute_ok(compute);
     while (continues) {
@@ -162,21 +156,21 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
 typedef struct {
     BandRows rows;
     BandBuffers buffers;
-} PassBand;
+} AccumulatedBand;
 
-typedef ARRAY_OF(PassBand) PassBands;
+typedef ARRAY_OF(AccumulatedBand) AccumulatedBands;
 
-// Renders the first pass, which divides the image into bands, each with separate buffers.
-static bool first_pass(Pass *pass, PassBands *bands, unsigned aovs, const BandQueue *queue)
+// Renders the first round, which divides the image into bands, each with separate buffers.
+static bool first_round(Pass *pass, AccumulatedBands *bands, unsigned aovs, const BandQueue *queue)
 {
-    Pace *pace = pass_pace(pass, KERNEL_RENDER);
+    Pace *pace = &pass->kernels.paces[KERNEL_RENDER];
     pace_begin_band(pace);
     const uint32_t height = pass->settings.region_height;
     const uint32_t most = rows_max(pass, aovs);
     bool continues = compute_ok(pass->compute);
     for (uint32_t row = 0; continues && row < height;) {
         uint32_t left = height - row;
-        PassBand band = {.rows = {row, band_rows(pass, pace, 1, left < most ? left : most)}};
+        AccumulatedBand band = {.rows = {row, band_rows(pass, pace, 1, left < most ? left : most)}};
         band_buffers_open(&band.buffers, pass, aovs, film_of_rows(pass, 0, band.rows.row_count), false);
         array_push(*bands, band);
         continues = band_sample(pass, &band.buffers, band.rows, 0, 1, queue) &&
@@ -192,20 +186,20 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void 
     const uint32_t count = pass->settings.sample_count;
     const unsigned last_layers = AOV_COLOR | (aovs & AOV_FLAG); // the last sample flags pixels
     const BandQueue queue = {.deliver = sink, .context = context};
-    PassBands bands = {0};
+    AccumulatedBands bands = {0};
     double start = clock_seconds(), seconds_of_sample;
-    bool continues = first_pass(pass, &bands, aovs, &queue);
+    bool continues = first_round(pass, &bands, aovs, &queue);
     seconds_of_sample = clock_seconds() - start;
     for (size_t i = 0; continues && aovs && i < bands.count; i++) {
-        PassBand *band = &bands.items[i];
+        AccumulatedBand *band = &bands.items[i];
         continues = band_fill_aovs(pass, &band->buffers, aovs, band->rows) &&
                     band_deliver(pass, &band->buffers, aovs, band->rows, 1, &queue);
     }
     for (uint32_t first = 1, end; continues && first < count; first = end) {
-        end = first + (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
+        end = first + (uint32_t)fmax(1, fmin(round_seconds / seconds_of_sample, count - first));
         start = clock_seconds();
         for (size_t i = 0; continues && i < bands.count; i++) {
-            PassBand *band = &bands.items[i];
+            AccumulatedBand *band = &bands.items[i];
             continues = band_sample(pass, &band->buffers, band->rows, first, end, &queue) &&
                         band_deliver(pass, &band->buffers, end < count ? AOV_COLOR : last_layers, band->rows,
                                      end, &queue);

@@ -19,7 +19,7 @@ typedef enum {
 
 typedef struct {
     ProgramRequest request;
-    Program program; // without a kernel until it is first requested
+    Program program; // has no kernel until it is first requested
 } KernelSlot;
 
 // Kernels whose text follows the same definitions.
@@ -30,7 +30,7 @@ typedef struct {
     KernelSlot slots[KERNEL_COUNT];
 } KernelVariant;
 
-// Starts as zero except for the first members.
+// Starts as zero except for the members before `variant`.
 typedef struct {
     const DeviceScene *scene;
     const RenderSettings *settings;

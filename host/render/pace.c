@@ -1,7 +1,7 @@
 // The cost of a band's samples is known only from the band's launches. A band of sky costs almost nothing,
-// and the next, of glass, may cost a hundred times as much. So a band's first pass has one sample per pixel,
+// and the next, of glass, may cost a hundred times as much. So a band's first sweep has one sample per pixel,
 // in launches whose size follows the duration of the previous launch and which aim at a part of the target.
-// The size of a later pass follows the duration of the previous pass, to which all pixels of the band
+// The size of a later sweep follows the duration of the previous sweep, to which all pixels of the band
 // contributed.
 #include "host/render/pace.h"
 
@@ -10,12 +10,12 @@
 enum {
     FIRST_BAND_SAMPLES = 1 << 17,
     FIRST_LAUNCH_SAMPLES = 1 << 12,
-    PASS_SAMPLES_MAX = 1024, // per pixel
+    SWEEP_SAMPLES_MAX = 1024, // per pixel
     BAND_GROWTH_MAX = 4,
     LAUNCH_GROWTH_MAX = 4,
 };
 
-static const double FIRST_PASS_SHARE = 0.25; // the part of the target at which a first pass's launches aim
+static const double first_sweep_share = 0.25; // the part of the target at which a first sweep's launches aim
 
 uint64_t pace_band_samples(const Pace *pace)
 {
@@ -27,25 +27,25 @@ uint64_t pace_band_samples(const Pace *pace)
 void pace_begin_band(Pace *pace)
 {
     pace->band_samples = pace->band_seconds = 0;
-    pace->pass_samples = pace->pass_seconds = 0;
+    pace->sweep_samples = pace->sweep_seconds = 0;
     pace->samples_per_second = 0;
 }
 
 uint64_t pace_launch_samples(const Pace *pace)
 {
     if (pace->launch_seconds <= 0) return FIRST_LAUNCH_SAMPLES;
-    const double last_rate = FIRST_PASS_SHARE * pace->launch_samples / pace->launch_seconds;
+    const double last_rate = first_sweep_share * pace->launch_samples / pace->launch_seconds;
     const double rate = pace->samples_per_second > 0 ? pace->samples_per_second : last_rate;
     const double largest = fmax(FIRST_LAUNCH_SAMPLES, LAUNCH_GROWTH_MAX * pace->launch_samples);
     return (uint64_t)fmax(1, fmin(fmax(rate * pace->target_seconds, pace->samples_min), largest));
 }
 
-uint32_t pace_begin_pass(Pace *pace, uint64_t pixels, uint32_t left)
+uint32_t pace_begin_sweep(Pace *pace, uint64_t pixels, uint32_t left)
 {
-    if (pace->pass_seconds > 0) pace->samples_per_second = pace->pass_samples / pace->pass_seconds;
-    pace->pass_samples = pace->pass_seconds = 0;
+    if (pace->sweep_seconds > 0) pace->samples_per_second = pace->sweep_samples / pace->sweep_seconds;
+    pace->sweep_samples = pace->sweep_seconds = 0;
     if (pace->launch_seconds > 0 && pace->samples_per_second <= 0) return 1;
-    const uint32_t largest = left < PASS_SAMPLES_MAX ? left : PASS_SAMPLES_MAX;
+    const uint32_t largest = left < SWEEP_SAMPLES_MAX ? left : SWEEP_SAMPLES_MAX;
     return (uint32_t)fmax(1, fmin((double)pace_launch_samples(pace) / (double)pixels, largest));
 }
 
@@ -53,8 +53,8 @@ void pace_record_launch(Pace *pace, uint64_t samples, double seconds)
 {
     pace->launch_samples = (double)samples;
     pace->launch_seconds = seconds;
-    pace->pass_samples += (double)samples;
-    pace->pass_seconds += seconds;
+    pace->sweep_samples += (double)samples;
+    pace->sweep_seconds += seconds;
     pace->band_samples += (double)samples;
     pace->band_seconds += seconds;
 }

@@ -7,15 +7,15 @@
 
 // Samples are counted over all pixels of a launch or band. A Pace starts as zero except for its first two
 // members. For each band, pace_band_samples reads the sums of the previous band and pace_begin_band clears
-// them. A band is rendered in passes over its pixels: pace_begin_pass starts each pass, and
+// them. A band is rendered in sweeps over its pixels: pace_begin_sweep starts each sweep, and
 // pace_launch_samples and pace_record_launch surround each of its launches.
 typedef struct {
     double target_seconds;                 // the intended duration of a launch
-    double samples_min;                    // keep the device busy; fewer take the same time
+    double samples_min;                    // of a launch; fewer take the same time
     double launch_samples, launch_seconds; // the last launch
-    double pass_samples, pass_seconds;     // the current pass so far
+    double sweep_samples, sweep_seconds;   // the current sweep so far
     double band_samples, band_seconds;     // the current band so far
-    double samples_per_second;             // in the band's last pass; 0 in its first
+    double samples_per_second;             // in the band's last sweep; 0 in its first
 } Pace;
 
 // Returns how many samples the next band has over all its pixels: as many as a launch of the target's
@@ -23,11 +23,11 @@ typedef struct {
 uint64_t pace_band_samples(const Pace *pace);
 void pace_begin_band(Pace *pace);
 
-// Returns how many of the `left` samples that each pixel of the band still needs the next pass renders; at
+// Returns how many of the `left` samples that each pixel of the band still needs the next sweep renders; at
 // least 1.
-uint32_t pace_begin_pass(Pace *pace, uint64_t pixels, uint32_t left);
+uint32_t pace_begin_sweep(Pace *pace, uint64_t pixels, uint32_t left);
 
-// Returns how many samples the next launch of the pass may have; at least 1. The first launch has 4,096. Each
-// later launch has at most the larger of 4,096 and four times the samples of the launch before it.
+// Returns how many samples the next launch of the sweep may have; at least 1. The first launch has 4,096.
+// Each later launch has at most the larger of 4,096 and four times the samples of the launch before it.
 uint64_t pace_launch_samples(const Pace *pace);
 void pace_record_launch(Pace *pace, uint64_t samples, double seconds);

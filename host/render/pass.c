@@ -8,6 +8,7 @@
 #include "host/compile/compile.h"
 #include "host/compile/features.h"
 #include "host/render/arithmetic.h"
+#include "host/render/launch_range.h"
 #include "host/render/sample_pattern.h"
 #include <stdlib.h>
 
@@ -122,6 +123,21 @@ static void sample_offsets_upload(Pass *pass)
     free(offsets);
 }
 
+enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
+
+// Sets the target of all paces and the samples with which a launch keeps the device busy.
+static void paces_set(Pass *pass)
+{
+    const double seconds = pass->settings.band_seconds;
+    const TileShape group = group_shape(pass);
+    for (size_t type = 0; type < KERNEL_COUNT; type++) {
+        Pace *pace = &pass->kernels.paces[type];
+        pace->target_seconds = seconds > 0 ? seconds : 0.1;
+        pace->samples_min =
+            (double)GROUPS_OF_UNIT_MIN * pass->compute->device->compute_units * group.width * group.height;
+    }
+}
+
 // Updates everything that depends on the scene and the settings: another eye may need another feature, or a
 // deeper stack.
 static void scene_changed(Pass *pass)
@@ -132,6 +148,7 @@ static void scene_changed(Pass *pass)
     sample_offsets_upload(pass);
     kernels_choose(&pass->kernels, prelude_of(pass, is_out_of_line),
                    can_be_easier ? prelude_of(pass, true) : (Text){0}, options);
+    paces_set(pass);
     if (pass->type != PASS_ALL) return;
     RenderReport *report = pass->report;
     report->features = compiled->features;

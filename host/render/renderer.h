@@ -37,10 +37,10 @@ void renderer_release_scene(Renderer *renderer);
 void renderer_close(Renderer *renderer);
 // Changes the scene and the settings. With settings->moves, only the camera of the scene may differ, and only
 // the size, region, cell, samples and bounces of the settings. Without it, all of the scene may differ except
-// its textures, and the BvhChoice. Textures stay on the device, and so do kernels that suit. Returns false with a message if a
-// number of the scene does not fit the precision, if the settings do not fit the device or if the scene does
-// not fit its memory; the renderer then still renders its previous scene. Returns false with no message if
-// the device failed.
+// its textures, and the BvhChoice. Textures stay on the device, and so do kernels that suit. Returns false
+// with a message if a number of the scene does not fit the precision, if the settings do not fit the device
+// or if the scene does not fit its memory; the renderer then still renders its previous scene. Returns false
+// with no message if the device failed.
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
@@ -58,11 +58,11 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
 // or the queue ended the render.
 bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue);
 
-// Renders the image in passes over all of its pixels, so that a preview sharpens. After the first pass every
-// pixel has one sample, and after the last it has all. The AOVs of the set follow the first pass, in bands
-// that have no color. AOV_FLAG is then re-delivered with the last pass, which flags pixels of the color. The
-// final image equals renderer_render's bit for bit. Returns false if the device
-// failed, or if settings.stop or the sink ended the render.
+// Renders the image in rounds over all of its pixels, so that a preview sharpens. After the first round every
+// pixel has one sample, and after the last it has all. The AOVs of the set follow the first round, in bands
+// that have no color. AOV_FLAG is then re-delivered with the last round, which flags pixels of the color. The
+// final image equals renderer_render's bit for bit. Returns false if the device failed, or if settings.stop
+// or the sink ended the render.
 bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
 // Renders the color and the AOVs of the set into one film in double, which film_free frees. Returns false,
@@ -70,8 +70,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void 
 bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 
 // Finds the closest hits of explicit rays (host/render/trace.h) with the intersection code that renders. The
-// report includes its kernel's build and hash, but neither its launches nor its reads. Returns false if the device failed; `hits` is then
-// undefined.
+// report includes its kernel's build and hash, but neither its launches nor its reads. Returns false if the
+// device failed; `hits` is then undefined.
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 // Finds the closest hits as renderer_trace does, but faster, because it computes neither reflected and
 // refracted rays nor transmission and light.

@@ -72,7 +72,7 @@ static void layer_merge(const RerenderedBand *band, Layer layer, const PixelList
     compute_unmap(band->pass->compute, band->buffers->film, values);
 }
 
-void band_clear_flags(Pass *pass, const BandBuffers *buffers, BandRows rows)
+void flag_layer_clear(Pass *pass, const BandBuffers *buffers, BandRows rows)
 {
     if (!layer_in(buffers->layers, LAYER_FLAG)) return;
     const Film band = film_of_rows(pass, rows.first_row, rows.row_count);
@@ -110,19 +110,6 @@ static void list_write(Pass *pass, cl_mem flags, const PixelList *list)
     free(bytes);
 }
 
-// Renders all samples of a list. Returns false if the device failed or settings.stop ended the render.
-static bool list_render(Pass *pass, const BandBuffers *buffers, const Place *place)
-{
-    const uint32_t end = samples_end(&pass->settings);
-    Pace *pace = pass_pace(pass, KERNEL_RENDER);
-    pace_begin_band(pace);
-    for (uint32_t first = pass->settings.first_sample, samples; first < end; first += samples) {
-        samples = pace_begin_pass(pace, place_pixels(place), end - first);
-        if (!band_render(pass, buffers, place, first, first + samples)) return false;
-    }
-    return true;
-}
-
 // Keeps the pixels of a rendered list that the pass flags. Adds their uncertain samples to the count.
 static bool list_keep_flagged(Pass *pass, const BandBuffers *buffers, PixelList *list, uint64_t *sample_count)
 {
@@ -147,17 +134,17 @@ static bool list_rerender(Pass *pass, const RerenderedBand *band, PixelList *lis
                        .height = 1,
                        .light_count = band->film.light_count,
                        .real_size = pass_scalar_size(pass)};
-    const Place place = list_place(pass, (uint32_t)list->count);
+    const LaunchRange range = launch_range_of_list(pass, (uint32_t)list->count);
     BandBuffers buffers = {0};
     band_buffers_open(&buffers, pass, band->aovs, film, false);
-    const bool is_last = samples_end(&pass->settings) == pass->settings.sample_count;
-    if (is_last && pass->compute == band->pass->compute) {
+    const uint32_t first = pass->settings.first_sample, end = samples_end(&pass->settings);
+    if (end == pass->settings.sample_count && pass->compute == band->pass->compute) {
         buffers.band_film = band->buffers->film;
         buffers.records = band->buffers->records;
     }
     list_write(pass, buffers.flags, list);
-    bool is_whole = band->type == KERNEL_RENDER ? list_render(pass, &buffers, &place)
-                                                : band_fill(pass, band->type, &buffers, band->aovs, &place);
+    bool is_whole = band->type == KERNEL_RENDER ? samples_render(pass, &buffers, &range, first, end, NULL)
+                                                : band_fill(pass, band->type, &buffers, band->aovs, &range);
     for (Layer layer = 0; layer < LAYER_COUNT && is_whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             !(layer == LAYER_COLOR && buffers.band_film) && film_layer_size(&band->film, layer) > 0)
@@ -172,8 +159,8 @@ bool band_rerender(Pass *pass, KernelType type, unsigned layers, BandBuffers *bu
 {
     const RerenderedBand band = {pass, type,    layers,
                                  aovs, buffers, film_of_rows(pass, rows.first_row, rows.row_count)};
-    const Place place = band_place(pass, rows);
-    const size_t word_count = place_flag_words(&place);
+    const LaunchRange range = launch_range_of_rows(pass, rows);
+    const size_t word_count = launch_range_flag_words(&range);
     uint32_t *words = memory_allocate(word_count, sizeof *words);
     bool is_whole = pass_read(pass, type == KERNEL_RENDER ? buffers->flags : buffers->center_flags, 0,
                               word_count * sizeof *words, words);

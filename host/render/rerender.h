@@ -3,8 +3,8 @@
 
 #include "host/render/band.h"
 
-// Clears the flags of a band's pixels.
-void band_clear_flags(Pass *pass, const BandBuffers *buffers, BandRows rows);
+// Clears the layer `flag` of a band if the buffers have it.
+void flag_layer_clear(Pass *pass, const BandBuffers *buffers, BandRows rows);
 
 // Re-renders in double precision, with bounds, the pixels that a kernel flagged. Re-renders those that remain
 // uncertified as at `double`. Adds the number of both to the buffers' counts and records them in the layer

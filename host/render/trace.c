@@ -106,10 +106,11 @@ static double trace_launch(Pass *pass, KernelType type, uint32_t count, cl_mem r
 {
     Compute *compute = pass->compute;
     cl_kernel kernel = kernels_get(&pass->kernels, type);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, rays);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 2, results);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3, objects);
+    cl_uint argument = SCENE_ARGUMENT_COUNT;
+    kernel_buffer(compute, kernel, argument++, rays);
+    kernel_argument(compute, kernel, argument++, sizeof count, &count);
+    kernel_buffer(compute, kernel, argument++, results);
+    kernel_buffer(compute, kernel, argument, objects);
     const size_t *fixed = compute->device->work_group, items = (count + pass->lanes - 1) / pass->lanes,
                  group = fixed[0] > 0 ? fixed[0] * fixed[1] : TRACE_GROUP;
     return kernels_launch(&pass->kernels, type, 1, NULL, &items, &group);
@@ -128,7 +129,7 @@ static void trace_batch(Pass *pass, KernelType type, const TraceRay *rays, size_
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
     compute_unmap(compute, ray_buffer, batch.ray_scalars);
     const double seconds = trace_launch(pass, type, (uint32_t)count, ray_buffer, results, objects);
-    pace_record_launch(pass_pace(pass, type), count, seconds);
+    pace_record_launch(&pass->kernels.paces[type], count, seconds);
     batch.result_scalars = pass_map(pass, results, 0, result_size, CL_MAP_READ);
     batch.objects = pass_map(pass, objects, 0, object_size, CL_MAP_READ);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, hits_read, &batch);
@@ -146,7 +147,7 @@ static bool pass_trace(Pass *pass, KernelType type, const TraceRay *rays, size_t
     // the report describes images, and a view queries one pixel after another
     RenderReport *report = pass->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
-    Pace *pace = pass_pace(pass, type);
+    Pace *pace = &pass->kernels.paces[type];
     pace_begin_band(pace);
     for (size_t first = 0, count; first < ray_count && compute_ok(compute); first += count) {
         count = ray_count - first < BATCH_RAYS_MAX ? ray_count - first : BATCH_RAYS_MAX;

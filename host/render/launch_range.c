@@ -1,4 +1,4 @@
-#include "host/render/place.h"
+#include "host/render/launch_range.h"
 
 // Returns the size of a work-item's macro-tile in pixels.
 static TileShape item_shape(uint32_t lanes)
@@ -33,12 +33,12 @@ static size_t divide_up(size_t count, size_t by)
     return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
 }
 
-Place band_place(const Pass *pass, BandRows rows)
+LaunchRange launch_range_of_rows(const Pass *pass, BandRows rows)
 {
     const RenderSettings *settings = &pass->settings;
     const TileShape item = item_shape(pass->lanes);
     const TileShape group = group_items(pass);
-    return (Place){
+    return (LaunchRange){
         .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
                   settings->region_width, rows.row_count}},
         .item = item,
@@ -46,14 +46,14 @@ Place band_place(const Pass *pass, BandRows rows)
         .group = {group.width, group.height}};
 }
 
-Place list_place(const Pass *pass, uint32_t count)
+LaunchRange launch_range_of_list(const Pass *pass, uint32_t count)
 {
     const uint32_t of_item = pass->lanes * pass->lanes;
     const TileShape group = group_items(pass);
-    return (Place){.band = {{0, 0, count, 1}},
-                   .item = {of_item, 1},
-                   .items = {divide_up(count, of_item), 1},
-                   .group = {(size_t)group.width * group.height, 1}};
+    return (LaunchRange){.band = {{0, 0, count, 1}},
+                         .item = {of_item, 1},
+                         .items = {divide_up(count, of_item), 1},
+                         .group = {(size_t)group.width * group.height, 1}};
 }
 
 static size_t least(size_t a, size_t b)
@@ -68,7 +68,7 @@ static size_t groups_of_part(size_t most, size_t left)
     return left <= most ? left : left < 2 * most ? (left + 1) / 2 : most;
 }
 
-bool place_next(Place *part, const Place *whole, uint64_t pixels_max)
+bool launch_range_next(LaunchRange *part, const LaunchRange *whole, uint64_t pixels_max)
 {
     const size_t *group = whole->group, *items = whole->items;
     size_t column = part->first[0] + part->items[0], row = part->first[1];
@@ -79,7 +79,7 @@ bool place_next(Place *part, const Place *whole, uint64_t pixels_max)
     if (row >= items[1]) return false;
     *part = *whole;
     // groups at the edges reach beyond the film
-    if (row == 0 && column == 0 && place_pixels(whole) <= pixels_max) return true;
+    if (row == 0 && column == 0 && launch_range_pixels(whole) <= pixels_max) return true;
     const size_t group_pixels = group[0] * group[1] * whole->item.width * whole->item.height;
     const size_t most = pixels_max > group_pixels ? (size_t)(pixels_max / group_pixels) : 1;
     const size_t row_groups = divide_up(items[0], group[0]);
@@ -95,14 +95,14 @@ bool place_next(Place *part, const Place *whole, uint64_t pixels_max)
     return true;
 }
 
-uint64_t place_pixels(const Place *place)
+uint64_t launch_range_pixels(const LaunchRange *range)
 {
-    const size_t left = place->first[0] * place->item.width, top = place->first[1] * place->item.height;
-    const uint64_t width = least(place->items[0] * place->item.width, place->band.s[2] - left);
-    return width * least(place->items[1] * place->item.height, place->band.s[3] - top);
+    const size_t left = range->first[0] * range->item.width, top = range->first[1] * range->item.height;
+    const uint64_t width = least(range->items[0] * range->item.width, range->band.s[2] - left);
+    return width * least(range->items[1] * range->item.height, range->band.s[3] - top);
 }
 
-size_t place_flag_words(const Place *place)
+size_t launch_range_flag_words(const LaunchRange *range)
 {
-    return divide_up(place->items[0] * place->items[1] * place->item.width * place->item.height, 32);
+    return divide_up(range->items[0] * range->items[1] * range->item.width * range->item.height, 32);
 }
