@@ -188,11 +188,9 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     Baseline *baseline = baseline_open(path, true, &messages);
     *error_count = message_count(&messages, MESSAGE_ERROR);
     if (*error_count) {
-        char *expected;
-        assert_true(asprintf(&expected, "'%s' is not a report of glint bench --json with schema 6", path) >
-                    0);
-        assert_string_equal(messages.items[0].text, expected);
-        free(expected);
+        const Message *message = &messages.items[0];
+        assert_non_null(strstr(message->text, message->file ? "not a report of glint bench --json: " : path));
+        if (message->file) assert_string_equal(message->file, path);
     }
     close(descriptor);
     return baseline;

@@ -149,6 +149,9 @@ class Bench(TestCase):
             self.assertRegex(process.stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
             self.assertRegex(process.stdout, r"(?m)processor time: [0-9.]+ \(.*\): slower by")
         self.refuses(f"{command} other-calibration", "'other-calibration' was calibrated by 524288 rounds instead of 1048576")
+        del report["calibration"]
+        write("no-calibration", json.dumps(report))
+        self.refuses(f"{command} no-calibration", "'no-calibration' was not calibrated")
         write("sphere.yaml", SPHERE + "# another file\n")
         self.glint(f"{command} report", status=1)  # without a row in common
         self.glint(f"{command} sphere.yaml", status=1)

@@ -138,30 +138,56 @@ static void *json_allocate(size_t size)
     return memory_allocate(size, 1);
 }
 
-Baseline *baseline_open(const char *path, bool needs_calibration, MessageList *messages)
+// Reads a file as JSON. Returns NULL with a message if it is not JSON or cannot be read.
+static json_t *json_read(const char *path, MessageList *messages)
 {
     Text text = {0};
-    if (!text_read_file(&text, path, messages)) {
-        text_free(&text);
-        return NULL;
-    }
+    json_t *json = NULL;
+    json_error_t error;
     // When an allocation fails, jansson 2.14 may lose bytes of a text; memory_allocate ends the process
     // instead.
     json_set_alloc_funcs(json_allocate, free);
-    json_t *report = json_loadb(text_c(&text), text.count, JSON_REJECT_DUPLICATES, NULL);
+    if (text_read_file(&text, path, messages)) {
+        json = json_loadb(text_c(&text), text.count, JSON_REJECT_DUPLICATES, &error);
+        const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+        // the position is past the faulty word
+        if (!json)
+            message_add_at(messages, MESSAGE_ERROR, &source,
+                           error.position > 0 ? (size_t)error.position - 1 : 0,
+                           "not a report of glint bench --json: %s", error.text);
+    }
     text_free(&text);
-    const json_t *runs = json_object_get(report, "runs");
-    if (!json_is_array(runs) || json_number_value(json_object_get(report, "schema")) != BENCH_SCHEMA) {
-        message_error(messages, "'%s' is not a report of glint bench --json with schema %d", path,
-                      BENCH_SCHEMA);
+    return json;
+}
+
+static bool schema_check(const char *path, const json_t *report, MessageList *messages)
+{
+    const json_t *schema = json_object_get(report, "schema");
+    if (!json_is_array(json_object_get(report, "runs")) || !json_is_number(schema))
+        return message_error(messages, "'%s' is not a report of glint bench --json", path);
+    return json_number_value(schema) == BENCH_SCHEMA ||
+           message_error(messages, "'%s' is a report with schema %g; expected %d: re-measure it", path,
+                         json_number_value(schema), BENCH_SCHEMA);
+}
+
+static bool calibration_check(const char *path, const Baseline *baseline, MessageList *messages)
+{
+    const json_t *rounds = json_object_get(json_object_get(baseline->json, "calibration"), "rounds");
+    if (!rounds) return message_error(messages, "'%s' was not calibrated; re-measure it", path);
+    return baseline->is_calibrated ||
+           message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d; re-measure it", path,
+                         json_number_value(rounds), CALIBRATION_ROUNDS);
+}
+
+Baseline *baseline_open(const char *path, bool needs_calibration, MessageList *messages)
+{
+    json_t *report = json_read(path, messages);
+    if (!report || !schema_check(path, report, messages)) {
         json_decref(report);
         return NULL;
     }
     Baseline *baseline = baseline_of(report);
-    if (!needs_calibration || baseline->is_calibrated) return baseline;
-    message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d; re-measure it", path,
-                  json_number_value(json_object_get(json_object_get(report, "calibration"), "rounds")),
-                  CALIBRATION_ROUNDS);
+    if (!needs_calibration || calibration_check(path, baseline, messages)) return baseline;
     baseline_close(baseline);
     return NULL;
 }
