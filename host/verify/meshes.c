@@ -225,11 +225,11 @@ void verify_bvh(VerifyRun *run)
         verify_trace_opened(run, tree, rays, M6_RAYS, hits);
         m6_rays(run, scene, batch * M6_RAYS, hits, rays);
         verify_trace_opened(run, list, rays, M6_RAYS, plain);
-        double unlimited = rays[0].tmax;
         for (size_t cut = 0; cut < COUNT_OF(parts); cut++) {
-            for (size_t i = 0; i < M6_RAYS; i++)
-                if (verify_is_hit(&plain[i]))
-                    rays[i].tmax = fmin(unlimited, verify_rounded(run, plain[i].t * parts[cut]));
+            for (size_t i = 0; i < M6_RAYS; i++) {
+                if (verify_is_hit(&plain[i])) rays[i].tmax = plain[i].t * parts[cut];
+                verify_round_ray(run, &rays[i]);
+            }
             verify_trace_opened(run, tree, rays, M6_RAYS, hits);
             for (size_t i = 0; i < M6_RAYS; i++) {
                 bool hit = verify_is_hit(&plain[i]) && plain[i].t < rays[i].tmax;

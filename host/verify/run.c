@@ -73,7 +73,7 @@ void verify_round_ray(const VerifyRun *run, TraceRay *ray)
     ray->origin = verify_rounded_vector(run, ray->origin);
     ray->direction = verify_rounded_vector(run, ray->direction);
     ray->tmin = verify_rounded(run, ray->tmin);
-    ray->tmax = fmin(ray->tmax, verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
+    ray->tmax = fmin(verify_rounded(run, ray->tmax), verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
 }
 
 TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction)
