@@ -27,6 +27,7 @@ class Errors(unittest.TestCase):
                 (lambda: glint.load("missing.yaml"), "missing.yaml.*No such file"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES + 1), "no vertex 8 of 8"),
                 (lambda: glint.load_mesh(CUBE_VERTICES * np.nan, CUBE_FACES), "vertex 0"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES, CUBE_VERTICES * np.nan), "normal 0"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES[:0]), "1 to"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, -CUBE_FACES), "no vertex -7"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, [[1 << 32, (1 << 32) + 1, 2]]), "no vertex 4294967297"),

@@ -29,9 +29,11 @@ void struct_write(void *given, const void *full, size_t full_size)
 
 bool struct_has_size(const void *given, size_t size_min, const char *type, MessageList *messages)
 {
-    size_t size = 0;
-    if (given) memcpy(&size, given, sizeof size);
-    return size >= size_min || message_error(messages, "the size of a %s is not set", type);
+    size_t size;
+    if (!given) return message_error(messages, "a %s is NULL", type);
+    memcpy(&size, given, sizeof size);
+    return size >= size_min ||
+           message_error(messages, "the size of a %s is %zu; expected its sizeof", type, size);
 }
 
 bool real_is_known(GlintReal real, MessageList *messages)
@@ -61,7 +63,10 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
                                            [GLINT_DOUBLE] = PRECISION_DOUBLE,
                                            [GLINT_CERTIFIED] = PRECISION_CERTIFIED};
     if ((size_t)given >= COUNT_OF(precisions))
-        return message_error(messages, "there is no precision %d", (int)given);
+        return message_error(messages,
+                             "precision is %d; expected GLINT_SINGLE, GLINT_STRICT, GLINT_DOUBLE or "
+                             "GLINT_CERTIFIED",
+                             (int)given);
     *precision = precisions[given];
     return true;
 }

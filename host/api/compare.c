@@ -12,9 +12,9 @@ static bool pair_read(GlintImagePair *read, const GlintImagePair *given, Message
 {
     if (!struct_read(read, sizeof *read, given, "GlintImagePair", messages)) return false;
     if (!real_is_known(read->real, messages)) return false;
-    const size_t row_max =
+    const size_t channels_max =
         SIZE_MAX / sizeof(double) / (read->width ? read->width : 1) / (read->height ? read->height : 1);
-    if (read->width == 0 || read->height == 0 || read->channels == 0 || read->channels > row_max)
+    if (read->width == 0 || read->height == 0 || read->channels == 0 || read->channels > channels_max)
         return message_error(messages,
                              "the images have %u x %u pixels of %u channels; expected at least 1 each, and "
                              "at most the values that fit in memory",

@@ -24,9 +24,9 @@ GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *
     DeviceList devices;
     device_list_open(&devices, NULL);
     *count = devices.count;
+    const bool is_sound =
+        capacity == 0 || struct_has_size(infos, sizeof infos->size, "GlintDeviceInfo", &list);
     const size_t stride = infos ? infos->size : 0;
-    bool is_sound = capacity == 0 || stride >= sizeof(size_t);
-    if (!is_sound) message_error(&list, "the size of a GlintDeviceInfo is not set");
     for (size_t i = 0; is_sound && i < devices.count && i < capacity; i++) {
         GlintDeviceInfo *info = (GlintDeviceInfo *)(void *)((char *)infos + i * stride);
         info->size = stride;

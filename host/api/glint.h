@@ -6,13 +6,13 @@
 // its kernel cache cannot be used. Apart from an out-of-memory message, the library prints nothing.
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
-// can add members. Members beyond the caller's size are read as 0. Pointers must not be NULL unless a comment
-// permits it.
+// can add members. Members beyond the caller's size are read as 0. A member that this version of the library
+// does not have must be 0, or the call is refused. Pointers must not be NULL unless a comment permits it.
 //
 // A scene does not depend on a device; a tracer needs its device. A device serves one call at a time, and
 // calls from other threads wait. Calls only read a scene, so several threads may use it at once. Listing
-// devices sets the environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out,
-// the process prints a message to stderr and exits.
+// devices and opening one set the environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If
+// memory runs out, the process prints a message to stderr and exits.
 #ifndef GLINT_H
 #define GLINT_H
 
@@ -130,7 +130,8 @@ void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *
 // Images
 
 // glint_render calls this repeatedly, from the thread that renders, with the fraction that is done. A nonzero
-// result stops the render.
+// result stops the render. The function may trace on the device that renders and close its tracers, but must
+// not close the device.
 typedef int (*GlintProgress)(void *context, double fraction_done);
 
 typedef struct {

@@ -71,7 +71,7 @@ static bool settings_read(RenderSettings *settings, const GlintRenderSettings *g
     *settings = settings_of_image(width, height, precision);
     if (given->samples > 0) settings->sample_count = given->samples;
     if (!(given->min_contribution >= 0 && given->min_contribution <= 1))
-        return message_error(messages, "min_contribution is not between 0 and 1");
+        return message_error(messages, "min_contribution is %g; expected 0 to 1", given->min_contribution);
     settings->bounce_count = given->bounces;
     settings->min_contribution = given->min_contribution;
     settings->lanes = given->lanes;

@@ -63,14 +63,14 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
     return scene_return(scene, &read, is_read, &list, messages);
 }
 
-// Copies vectors. Returns false with a message if one is not finite or is too far away.
-static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, size_t count,
+// Copies vectors. Returns false with a message that starts with `noun` if one is not finite or too large.
+static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, size_t count, const char *noun,
                          MessageList *messages)
 {
     numbers_widen((double *)vectors, reals, 3 * count, real == GLINT_FLOAT64);
     for (size_t i = 0; i < count; i++)
         if (!vector_is_within(vectors[i], NUMBER_MAX))
-            return message_error(messages, "vertex %zu: expected numbers up to %g", i, NUMBER_MAX);
+            return message_error(messages, "%s %zu: expected numbers up to %g", noun, i, NUMBER_MAX);
     return true;
 }
 
@@ -78,10 +78,12 @@ static bool mesh_is_sound(const GlintMesh *given, MessageList *messages)
 {
     enum { TRIANGLES_MAX = 1 << 24 };
     if (!real_is_known(given->real, messages)) return false;
-    if (!given->vertices || !given->triangles || given->triangle_count == 0 ||
-        given->triangle_count > TRIANGLES_MAX || given->vertex_count > UINT32_MAX)
+    if (given->triangle_count == 0 || given->triangle_count > TRIANGLES_MAX ||
+        given->vertex_count > UINT32_MAX)
         return message_error(messages, "expected 1 to %d triangles and at most %u vertices, not %zu and %zu",
                              TRIANGLES_MAX, UINT32_MAX, given->triangle_count, given->vertex_count);
+    if (!given->vertices || !given->triangles)
+        return message_error(messages, "a mesh needs vertices and triangles");
     for (size_t i = 0; i < 3 * given->triangle_count; i++)
         if (given->triangles[i] >= given->vertex_count)
             return message_error(messages, "triangle %zu: there is no vertex %u of %zu", i / 3,
@@ -102,9 +104,10 @@ GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char 
         copy.triangles = memory_allocate(given.triangle_count, sizeof *copy.triangles);
         memcpy(copy.triangles, given.triangles, given.triangle_count * sizeof *copy.triangles);
         if (given.normals) copy.normals = memory_allocate(given.vertex_count, sizeof *copy.normals);
-        is_read = vectors_read(copy.vertices, given.real, given.vertices, given.vertex_count, &list) &&
-                  (!given.normals ||
-                   vectors_read(copy.normals, given.real, given.normals, given.vertex_count, &list));
+        is_read =
+            vectors_read(copy.vertices, given.real, given.vertices, given.vertex_count, "vertex", &list) &&
+            (!given.normals ||
+             vectors_read(copy.normals, given.real, given.normals, given.vertex_count, "normal", &list));
         for (size_t i = 0; copy.normals && i < copy.vertex_count; i++)
             if (!vector_is_zero(copy.normals[i])) copy.normals[i] = vector_normalize(copy.normals[i]);
         if (is_read)
