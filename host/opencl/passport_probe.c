@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
+#include "host/base/random.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -95,13 +96,9 @@ bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands
     return is_read;
 }
 
-// Implements Sebastiano Vigna's splitmix64.
 uint64_t probe_random_bits(Measurement *measurement)
 {
-    uint64_t bits = measurement->random += 0x9e3779b97f4a7c15U;
-    bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9U;
-    bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebU;
-    return bits ^ (bits >> 31);
+    return random_next(&measurement->random);
 }
 
 double probe_random_real(Measurement *measurement, int span)

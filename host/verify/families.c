@@ -1,6 +1,7 @@
 #include "host/verify/families.h"
 
 #include "host/base/array.h"
+#include "host/base/random.h"
 #include <math.h>
 #include <string.h>
 
@@ -10,54 +11,47 @@
 
 const Vector3 far_sphere_center = {148376, 1234, -223423};
 
-// The finalizer of splitmix64 (Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014).
-static uint64_t mixed(uint64_t state)
+// Returns the number from 0 to 1 that random bits stand for.
+static double unit_interval(uint64_t bits)
 {
-    state = (state ^ state >> 30) * 0xbf58476d1ce4e5b9u;
-    state = (state ^ state >> 27) * 0x94d049bb133111ebu;
-    return state ^ state >> 31;
+    return (double)(bits >> 11) * 0x1p-53;
 }
 
-static double part_of_one(uint64_t state)
+double sample_number(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return (double)(state >> 11) * 0x1p-53;
+    return unit_interval(random_mix((((uint64_t)seed << 40) + index * 32 + dimension + 1) * RANDOM_STEP));
 }
 
-double random_at(unsigned seed, uint64_t index, unsigned dimension)
+double sample_symmetric(unsigned seed, uint64_t index, unsigned dimension)
 {
-    return part_of_one(mixed((((uint64_t)seed << 40) + index * 32 + dimension + 1) * 0x9e3779b97f4a7c15u));
+    return 2 * sample_number(seed, index, dimension) - 1;
 }
 
-double random_symmetric(unsigned seed, uint64_t index, unsigned dimension)
+static unsigned sample_choice(unsigned seed, uint64_t index, unsigned dimension, unsigned count)
 {
-    return 2 * random_at(seed, index, dimension) - 1;
+    return (unsigned)(sample_number(seed, index, dimension) * count);
 }
 
-static unsigned random_choice(unsigned seed, uint64_t index, unsigned dimension, unsigned count)
-{
-    return (unsigned)(random_at(seed, index, dimension) * count);
-}
-
-static Vector3 unit(Vector3 a)
+static Vector3 unit_vector(Vector3 a)
 {
     double length = sqrt(vector_dot(a, a));
     return (Vector3){a.x / length, a.y / length, a.z / length};
 }
 
-Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension)
+Vector3 sample_in_cube(unsigned seed, uint64_t index, unsigned first_dimension)
 {
-    return (Vector3){random_symmetric(seed, index, first_dimension),
-                     random_symmetric(seed, index, first_dimension + 1),
-                     random_symmetric(seed, index, first_dimension + 2)};
+    return (Vector3){sample_symmetric(seed, index, first_dimension),
+                     sample_symmetric(seed, index, first_dimension + 1),
+                     sample_symmetric(seed, index, first_dimension + 2)};
 }
 
-Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension)
+Vector3 sample_unit_vector(unsigned seed, uint64_t index, unsigned first_dimension)
 {
-    return unit(random_in_cube(seed, index, first_dimension));
+    return unit_vector(sample_in_cube(seed, index, first_dimension));
 }
 
 // Returns a x + b y + from.
-static Vector3 combine(double a, Vector3 x, double b, Vector3 y, Vector3 from)
+static Vector3 vectors_combine(double a, Vector3 x, double b, Vector3 y, Vector3 from)
 {
     return vector_add(vector_add(vector_scale(x, a), vector_scale(y, b)), from);
 }
@@ -75,7 +69,7 @@ static TraceRay ray_toward(Vector3 origin, Vector3 target)
 }
 
 // Computes a point of the unit circle by its rational parametrization.
-static void on_circle(double turn, double *cosine, double *sine)
+static void circle_point(double turn, double *cosine, double *sine)
 {
     unsigned quarter = (unsigned)(turn * 4);
     double w = turn * 4 - quarter;
@@ -91,26 +85,26 @@ TraceRay family_disc_rim(uint64_t i)
 {
     static const double distances[] = {5, 500, 5e4};
     const Vector3 center = {10, 20, 30};
-    Vector3 e = unit((Vector3){1, -1, 0}), f = unit((Vector3){1, 1, -2});
-    Vector3 away = random_unit(3, i, 0);
-    unsigned steps = 1 + random_choice(3, i, 3, 64);
-    double side = random_at(3, i, 4) < 0.5 ? 1 : -1;
+    Vector3 e = unit_vector((Vector3){1, -1, 0}), f = unit_vector((Vector3){1, 1, -2});
+    Vector3 away = sample_unit_vector(3, i, 0);
+    unsigned steps = 1 + sample_choice(3, i, 3, 64);
+    double side = sample_number(3, i, 4) < 0.5 ? 1 : -1;
     double radius = 2 * (1 + side * steps * 0x1p-22);
     double c, s;
-    on_circle(random_at(3, i, 5), &c, &s);
-    Vector3 target = combine(radius * c, e, radius * s, f, center);
+    circle_point(sample_number(3, i, 5), &c, &s);
+    Vector3 target = vectors_combine(radius * c, e, radius * s, f, center);
     return ray_toward(vector_add(vector_scale(away, distances[i % 3]), center), target);
 }
 
 // Aims at a point on an edge, a corner and a point in a face of the room, in turn.
 TraceRay family_in_room(uint64_t i)
 {
-    unsigned axis = random_choice(5, i, 0, 3);
+    unsigned axis = sample_choice(5, i, 0, 3);
     double target[3];
     for (unsigned k = 0; k < 3; k++)
-        target[k] = random_at(5, i, 1 + k) < 0.5 ? 1 : -1;
-    if (i % 3 != 1) target[axis] = random_symmetric(5, i, 4);
-    if (i % 3 == 2) target[(axis + 1) % 3] = random_symmetric(5, i, 5);
+        target[k] = sample_number(5, i, 1 + k) < 0.5 ? 1 : -1;
+    if (i % 3 != 1) target[axis] = sample_symmetric(5, i, 4);
+    if (i % 3 == 2) target[(axis + 1) % 3] = sample_symmetric(5, i, 5);
     return ray_toward((Vector3){0.1, 0.2, 0.3}, vector_from(target));
 }
 
@@ -121,40 +115,41 @@ TraceRay family_cylinder_rim(uint64_t i)
     const Vector3 e = {2.0 / 3, 1.0 / 3, -2.0 / 3}, f = {2.0 / 3, -2.0 / 3, 1.0 / 3};
     bool outside = i % 2 == 1;
     double inset = outside ? 1e-5 : 0;
-    double height = random_at(14, i, 0) < 0.5 ? inset : 2 - inset;
+    double height = sample_number(14, i, 0) < 0.5 ? inset : 2 - inset;
     double c, s;
-    on_circle(random_at(14, i, 1), &c, &s);
+    circle_point(sample_number(14, i, 1), &c, &s);
     double radius = 1 - inset;
-    Vector3 target = vector_add(combine(radius * c, e, radius * s, f, vector_scale(axis, height)), base);
+    Vector3 target =
+        vector_add(vectors_combine(radius * c, e, radius * s, f, vector_scale(axis, height)), base);
     Vector3 inner = vector_add(axis, base);
     if (!outside) return ray_toward(inner, target);
-    Vector3 away = random_unit(14, i, 2);
+    Vector3 away = sample_unit_vector(14, i, 2);
     return ray_toward(vector_add(vector_scale(away, 5), inner), target);
 }
 
 TraceRay family_along_torus_axis(uint64_t i)
 {
-    Vector3 origin = {1.3 * random_symmetric(22, i, 0), 1.3 * random_symmetric(22, i, 1), 10};
+    Vector3 origin = {1.3 * sample_symmetric(22, i, 0), 1.3 * sample_symmetric(22, i, 1), 10};
     return ray_along(origin, (Vector3){0, 0, -1});
 }
 
 TraceRay family_across_torus(uint64_t i)
 {
-    Vector3 origin = {-5, 1.3 * random_symmetric(23, i, 0), 1e-6 * random_symmetric(23, i, 1)};
+    Vector3 origin = {-5, 1.3 * sample_symmetric(23, i, 0), 1e-6 * sample_symmetric(23, i, 1)};
     return ray_along(origin, (Vector3){1, 0, 0});
 }
 
-TraceRay family_beside_sliver(uint64_t i)
+TraceRay family_near_sliver(uint64_t i)
 {
     const Vector3 a = sliver_corners[0];
     Vector3 ab = vector_subtract(sliver_corners[1], a), ac = vector_subtract(sliver_corners[2], a);
-    Vector3 n = unit(vector_cross(ab, ac));
-    Vector3 e = unit(ab), f = vector_cross(n, e);
+    Vector3 n = unit_vector(vector_cross(ab, ac));
+    Vector3 e = unit_vector(ab), f = vector_cross(n, e);
     double c, s;
-    on_circle(random_at(34, i, 0), &c, &s);
+    circle_point(sample_number(34, i, 0), &c, &s);
     const double grazing = 0.009076; // the tangent of 0.52 degrees
-    Vector3 direction = unit(combine(c, e, s, f, vector_scale(n, grazing)));
-    Vector3 target = combine(random_at(34, i, 1), ab, 0.3 * random_symmetric(34, i, 2), ac, a);
+    Vector3 direction = unit_vector(vectors_combine(c, e, s, f, vector_scale(n, grazing)));
+    Vector3 target = vectors_combine(sample_number(34, i, 1), ab, 0.3 * sample_symmetric(34, i, 2), ac, a);
     return ray_along(vector_add(vector_scale(direction, -100), target), direction);
 }
 
@@ -186,16 +181,16 @@ void scene_triangle_room(Scene *scene)
 
 // Moves a vertex off the unit sphere by up to 20 %. A hash of its coordinates seeds the offset, so all
 // triangles that share the vertex agree.
-static Vector3 jittered(Vector3 vertex)
+static Vector3 vertex_displace(Vector3 vertex)
 {
     const double parts[] = {vertex.x + 0.0, vertex.y + 0.0, vertex.z + 0.0};
     uint64_t state = 31;
     for (size_t k = 0; k < 3; k++) {
         uint64_t bits;
         memcpy(&bits, &parts[k], sizeof bits);
-        state = mixed(state + bits);
+        state = random_mix(state + bits);
     }
-    double size = 1 + 0.2 * (2 * part_of_one(state) - 1);
+    double size = 1 + 0.2 * (2 * unit_interval(state) - 1);
     return vector_scale(vertex, size);
 }
 
@@ -208,11 +203,13 @@ static Corners icosphere_part(Corners whole, unsigned depth, unsigned path)
 {
     while (depth-- > 0) {
         Vector3 a = whole.corners[0], b = whole.corners[1], c = whole.corners[2];
-        Vector3 ab = unit(vector_add(a, b)), bc = unit(vector_add(b, c)), ca = unit(vector_add(c, a));
+        Vector3 ab = unit_vector(vector_add(a, b)), bc = unit_vector(vector_add(b, c)),
+                ca = unit_vector(vector_add(c, a));
         const Corners parts[] = {{{a, ab, ca}}, {{ab, b, bc}}, {{ca, bc, c}}, {{ab, bc, ca}}};
         whole = parts[path >> (2 * depth) & 3];
     }
-    return (Corners){{jittered(whole.corners[0]), jittered(whole.corners[1]), jittered(whole.corners[2])}};
+    return (Corners){{vertex_displace(whole.corners[0]), vertex_displace(whole.corners[1]),
+                      vertex_displace(whole.corners[2])}};
 }
 
 enum {
@@ -225,9 +222,9 @@ static Vector3 icosahedron_corner(unsigned i)
 {
     double g = (1 + sqrt(5)) / 2;
     double one = i & 1 ? 1 : -1, golden = i & 2 ? -g : g;
-    if (i < 4) return unit((Vector3){one, golden, 0});
-    if (i < 8) return unit((Vector3){0, one, golden});
-    return unit((Vector3){golden, 0, one});
+    if (i < 4) return unit_vector((Vector3){one, golden, 0});
+    if (i < 8) return unit_vector((Vector3){0, one, golden});
+    return unit_vector((Vector3){golden, 0, one});
 }
 
 static Corners icosphere_triangle(unsigned index)
@@ -251,16 +248,16 @@ void scene_icosphere(Scene *scene)
 // of five), at vertices (two) and at points in faces (one).
 TraceRay family_from_within(uint64_t i)
 {
-    unsigned point = random_choice(31, i, 0, 100);
-    Vector3 origin = vector_scale(random_in_cube(32, point, 0), 0.17);
-    Corners triangle = icosphere_triangle(random_choice(31, i, 1, ICOSPHERE_COUNT));
-    unsigned first = random_choice(31, i, 2, 3);
+    unsigned point = sample_choice(31, i, 0, 100);
+    Vector3 origin = vector_scale(sample_in_cube(32, point, 0), 0.17);
+    Corners triangle = icosphere_triangle(sample_choice(31, i, 1, ICOSPHERE_COUNT));
+    unsigned first = sample_choice(31, i, 2, 3);
     Vector3 a = triangle.corners[first], b = triangle.corners[(first + 1) % 3],
             c = triangle.corners[(first + 2) % 3];
     double u = 0, v = 0;
-    if (i % 5 < 2 || i % 5 == 4) u = random_at(31, i, 3);
-    if (i % 5 == 4) v = (1 - u) * random_at(31, i, 4);
-    return ray_toward(origin, combine(u, vector_subtract(b, a), v, vector_subtract(c, a), a));
+    if (i % 5 < 2 || i % 5 == 4) u = sample_number(31, i, 3);
+    if (i % 5 == 4) v = (1 - u) * sample_number(31, i, 4);
+    return ray_toward(origin, vectors_combine(u, vector_subtract(b, a), v, vector_subtract(c, a), a));
 }
 
 void scene_far_sphere(Scene *scene)

@@ -12,17 +12,17 @@ typedef TraceRay (*RayFamily)(uint64_t index);
 // Return counter-based random numbers in dimension `dimension`, 0 to 31, of sample `index` of sequence
 // `seed`. They are a number from 0 to 1, one from -1 to 1, a point of the cube from -1 to 1 and a unit
 // vector. The last two use three dimensions.
-double random_at(unsigned seed, uint64_t index, unsigned dimension);
-double random_symmetric(unsigned seed, uint64_t index, unsigned dimension);
-Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension);
-Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension);
+double sample_number(unsigned seed, uint64_t index, unsigned dimension);
+double sample_symmetric(unsigned seed, uint64_t index, unsigned dimension);
+Vector3 sample_in_cube(unsigned seed, uint64_t index, unsigned first_dimension);
+Vector3 sample_unit_vector(unsigned seed, uint64_t index, unsigned first_dimension);
 
 TraceRay family_disc_rim(uint64_t index);         // P3
 TraceRay family_in_room(uint64_t index);          // P5
 TraceRay family_cylinder_rim(uint64_t index);     // C4
 TraceRay family_along_torus_axis(uint64_t index); // T2
 TraceRay family_across_torus(uint64_t index);     // T3
-TraceRay family_beside_sliver(uint64_t index);    // M4
+TraceRay family_near_sliver(uint64_t index);      // M4
 TraceRay family_from_within(uint64_t index);      // M1
 
 void scene_add_triangle(Scene *scene, const Vector3 vertices[3]);

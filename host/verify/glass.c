@@ -92,8 +92,8 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     TraceHit *first = verify_allocate(run, COUNT, sizeof *first),
              *second = verify_allocate(run, COUNT, sizeof *second);
     for (uint64_t i = 0; i < COUNT; i++) {
-        Vector3 from = vector_scale(random_unit(seed, i, 0), 4);
-        Vector3 at = vector_scale(random_unit(seed, i, 3), random_at(seed, i, 6));
+        Vector3 from = vector_scale(sample_unit_vector(seed, i, 0), 4);
+        Vector3 at = vector_scale(sample_unit_vector(seed, i, 3), sample_number(seed, i, 6));
         rays[i] = verify_ray(run, from, vector_normalize(vector_subtract(at, from)));
     }
     Scene *scene = matched_scene(run, object);

@@ -93,9 +93,9 @@ void verify_instances(VerifyRun *run)
                                   .as.mesh = {.is_instance = true, .transform = placed[which].transform}},
                          &material);
         for (uint64_t i = 0; i < COUNT; i++) {
-            const Vector3 from = vector_scale(random_in_cube(73, which * COUNT + i, 0), 0.3);
+            const Vector3 from = vector_scale(sample_in_cube(73, which * COUNT + i, 0), 0.3);
             rays[i] = verify_ray(run, affine_point(&placed[which].transform, from),
-                                 random_unit(73, which * COUNT + i, 3));
+                                 sample_unit_vector(73, which * COUNT + i, 3));
         }
         for (int bounce = 0; bounce < 3; bounce++) {
             const TraceHit *hits = verify_trace(run, scene, true, rays, COUNT);

@@ -19,8 +19,8 @@ void verify_far_mesh(VerifyRun *run)
     for (uint64_t batch = 0; batch < verify_part(run, BATCHES); batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
-            Vector3 origin = vector_add(far_sphere_center, random_in_cube(65, index, 0));
-            rays[i] = verify_ray(run, origin, random_unit(65, index, 3));
+            Vector3 origin = vector_add(far_sphere_center, sample_in_cube(65, index, 0));
+            rays[i] = verify_ray(run, origin, sample_unit_vector(65, index, 3));
         }
         verify_trace_opened(run, opened, rays, COUNT, hits);
         for (size_t i = 0; i < COUNT; i++)
@@ -60,7 +60,7 @@ void verify_within_triangle(VerifyRun *run)
 {
     enum { COUNT = 100000 };
     TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
-    verify_family(run, family_beside_sliver, 0, COUNT, rays);
+    verify_family(run, family_near_sliver, 0, COUNT, rays);
     Scene *scene = verify_empty_scene(run);
     scene_add_triangle(scene, sliver_corners);
     const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
@@ -86,7 +86,7 @@ void verify_facing_triangle(VerifyRun *run)
     static const Vector3 corners[] = {{2001, 1002, -1998}, {2001, -1998, 1002}, {-3999, 1002, 1002}};
     TraceRay rays[COUNT];
     for (uint64_t i = 0; i < COUNT; i++)
-        rays[i] = verify_ray(run, random_in_cube(72, i, 0), (Vector3){1, 2, 2});
+        rays[i] = verify_ray(run, sample_in_cube(72, i, 0), (Vector3){1, 2, 2});
     Scene *scene = verify_empty_scene(run);
     scene_add_triangle(scene, corners);
     const TraceHit *hits = verify_trace(run, scene, false, rays, COUNT);
@@ -101,9 +101,9 @@ void verify_facing_triangle(VerifyRun *run)
 static void add_random_triangles(Scene *scene, unsigned count, double size)
 {
     for (uint64_t i = 0; i < count; i++) {
-        Vector3 a = random_in_cube(66, i, 0);
-        scene_add_triangle(scene, (Vector3[]){a, vector_add(a, vector_scale(random_in_cube(66, i, 3), size)),
-                                              vector_add(a, vector_scale(random_in_cube(66, i, 6), size))});
+        Vector3 a = sample_in_cube(66, i, 0);
+        scene_add_triangle(scene, (Vector3[]){a, vector_add(a, vector_scale(sample_in_cube(66, i, 3), size)),
+                                              vector_add(a, vector_scale(sample_in_cube(66, i, 6), size))});
     }
 }
 
@@ -130,12 +130,12 @@ void verify_degenerate_meshes(VerifyRun *run)
     };
     TraceRay *rays = verify_allocate(run, count, sizeof *rays);
     for (uint64_t i = 0; i < count; i++) {
-        Vector3 origin = vector_scale(random_unit(67, i, 0), 4);
-        Vector3 target = random_in_cube(67, i, 3);
+        Vector3 origin = vector_scale(sample_unit_vector(67, i, 0), 4);
+        Vector3 target = sample_in_cube(67, i, 3);
         if (i % 2) {
             const Vector3 *corners = degenerate[i / 2 % 4];
             Vector3 along = vector_subtract(corners[2], corners[0]);
-            target = vector_add(corners[0], vector_scale(along, i % 4 == 1 ? 0.5 : random_at(67, i, 6)));
+            target = vector_add(corners[0], vector_scale(along, i % 4 == 1 ? 0.5 : sample_number(67, i, 6)));
         }
         rays[i] = verify_ray(run, origin, vector_subtract(target, origin));
     }
@@ -165,7 +165,7 @@ static Scene *m6_scene(VerifyRun *run)
     add_random_triangles(scene, M6_TRIANGLES, 0.05);
     Random random = {68};
     for (size_t i = 0; i < form_count * M6_OTHERS; i++) {
-        Vector3 center = random_in_cube(68, i, 0);
+        Vector3 center = sample_in_cube(68, i, 0);
         RandomShape shape =
             random_shape_at(&forms[i % form_count], center, random_between(&random, 0.02, 0.1), &random);
         if (forms[i % form_count].bounded) array_push(scene->objects, shape.object);
@@ -177,8 +177,8 @@ static Scene *m6_scene(VerifyRun *run)
 static Vector3 m6_point_in_plane(const Vector3 vertices[3], uint64_t index)
 {
     Vector3 ab = vector_subtract(vertices[1], vertices[0]), ac = vector_subtract(vertices[2], vertices[0]);
-    Vector3 along = vector_add(vector_scale(ab, random_symmetric(69, index, 1)),
-                               vector_scale(ac, random_symmetric(69, index, 2)));
+    Vector3 along = vector_add(vector_scale(ab, sample_symmetric(69, index, 1)),
+                               vector_scale(ac, sample_symmetric(69, index, 2)));
     return vector_add(vertices[0], vector_scale(vector_normalize(along), 3));
 }
 
@@ -188,15 +188,15 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
                     TraceRay *rays)
 {
     for (uint64_t i = first; i < first + M6_RAYS; i++) {
-        uint64_t triangle = (uint64_t)(random_at(69, i, 0) * M6_TRIANGLES);
+        uint64_t triangle = (uint64_t)(sample_number(69, i, 0) * M6_TRIANGLES);
         Vector3 corner = scene->objects.items[triangle].as.triangle.vertices[i % 3];
-        Vector3 origin = vector_scale(random_unit(69, i, 1), 3), direction = random_in_cube(69, i, 4);
+        Vector3 origin = vector_scale(sample_unit_vector(69, i, 1), 3), direction = sample_in_cube(69, i, 4);
         if (i % 4 == 0) direction = vector_subtract(direction, origin);
         if (i % 4 == 1) {
             double parts[] = {0, 0, 0};
             parts[i / 4 % 3] = i / 16 % 2 ? 1 : -1;
             direction = vector_from(parts);
-            origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
+            origin = vector_subtract(corner, vector_scale(direction, 3 * sample_number(69, i, 7)));
         }
         if (i % 4 == 2 && i / 4 % 2)
             origin = m6_point_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);

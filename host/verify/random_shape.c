@@ -1,6 +1,7 @@
 #include "host/verify/random_shape.h"
 
 #include "host/base/fault.h"
+#include "host/base/random.h"
 #include "host/compile/shapes.h"
 
 #define FORMS_DECLARE(feature, Type, name, names) extern const RandomForms name##_forms;
@@ -10,13 +11,9 @@ SHAPE_LIST(FORMS_DECLARE)
 #define FORMS_ROW(feature, Type, name, names) &name##_forms,
 static const RandomForms *const shapes[SHAPE_MESH] = {SHAPE_LIST(FORMS_ROW)};
 
-// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
 uint64_t random_bits(Random *random)
 {
-    uint64_t z = random->state += 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
+    return random_next(&random->state);
 }
 
 bool random_coin(Random *random)

@@ -219,7 +219,7 @@ const VerifyRays verify_rays[] = {
      .decided_tiers = "ABCD"},
     {"M4", "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0.5, 1e-06, 0]]}\n", BY_NUMBERS(m4)},
     {"M4", "  - triangle: {vertices: [[1, 2, 3], [8.5, 5.7, -4.5], [7.5, 5.8, -3.6]]}\n",
-     .family = family_beside_sliver, .ray_count = 100000, .checked_count = CHECKED},
+     .family = family_near_sliver, .ray_count = 100000, .checked_count = CHECKED},
     {"M5",
      "  - triangle: {vertices: [[-1113.45459, -79.049614, -56.2431908], [-1113.45459, -87.0922699, "
      "-56.2431908], [-1113.45459, -79.2090149, -56.2431908]]}\n",

@@ -15,8 +15,8 @@ void verify_scaled_directions(VerifyRun *run)
     static const int exponents[] = {0, 20, -20};
     TraceRay rays[3][COUNT];
     for (uint64_t i = 0; i < COUNT; i++) {
-        Vector3 origin = vector_scale(random_unit(61, i, 0), i % 2 ? 0.7 : 3);
-        Vector3 target = vector_scale(random_unit(61, i, 3), 0.9);
+        Vector3 origin = vector_scale(sample_unit_vector(61, i, 0), i % 2 ? 0.7 : 3);
+        Vector3 target = vector_scale(sample_unit_vector(61, i, 3), 0.9);
         rays[0][i] = verify_ray(run, origin, vector_subtract(target, origin));
         for (size_t k = 1; k < 3; k++) {
             rays[k][i] = rays[0][i];
@@ -42,11 +42,11 @@ static Scene *spheres_of_all_sizes(VerifyRun *run, unsigned group)
         uint64_t index = group * SPHERES + i;
         Object object = {.type = SHAPE_SPHERE};
         for (unsigned k = 0; k < 3; k++) {
-            double size = pow(10, 4 * random_symmetric(62, index, k));
+            double size = pow(10, 4 * sample_symmetric(62, index, k));
             (&object.as.sphere.center.x)[k] =
-                verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
+                verify_rounded(run, sample_number(62, index, 3 + k) < 0.5 ? size : -size);
         }
-        object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
+        object.as.sphere.radius = verify_rounded(run, pow(10, 4 * sample_symmetric(62, index, 6)));
         array_push(scene->objects, object);
     }
     return scene;
@@ -68,10 +68,10 @@ static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned g
         uint64_t index = group * SPHERES + i;
         Vector3 center = scene->objects.items[i].as.sphere.center;
         double radius = scene->objects.items[i].as.sphere.radius;
-        double away = radius * (1 + pow(10, 2 * random_symmetric(63, index, 0)));
-        Vector3 origin = vector_add(center, vector_scale(random_unit(63, index, 1), away));
-        double off = 0.9 * radius * random_at(63, index, 4);
-        Vector3 target = vector_add(center, vector_scale(random_unit(63, index, 5), off));
+        double away = radius * (1 + pow(10, 2 * sample_symmetric(63, index, 0)));
+        Vector3 origin = vector_add(center, vector_scale(sample_unit_vector(63, index, 1), away));
+        double off = 0.9 * radius * sample_number(63, index, 4);
+        Vector3 target = vector_add(center, vector_scale(sample_unit_vector(63, index, 5), off));
         rays[i] = verify_ray(run, origin, vector_subtract(target, origin));
     }
 }
@@ -84,7 +84,7 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
     static TraceRay rays[2 * DIRECTIONS];
     static TraceHit hits[2 * DIRECTIONS];
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
-        Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
+        Vector3 direction = sample_unit_vector(64, sphere * DIRECTIONS + i, 0);
         if (vector_dot(direction, first->normal) < 0) direction = vector_scale(direction, -1);
         rays[i] = verify_ray(run, first->reflected_origin, direction);
         rays[DIRECTIONS + i] = verify_ray(run, first->refracted_origin, vector_scale(direction, -1));
@@ -145,9 +145,10 @@ void verify_coincident_faces(VerifyRun *run)
     static TraceRay rays[COUNT];
     const TraceHit *alone[COINCIDENT];
     for (uint64_t i = 0; i < COUNT; i++) {
-        Vector3 origin = {0.5, random_at(7, i, 0), random_at(7, i, 1)}, direction = {1, 0, 0};
+        Vector3 origin = {0.5, sample_number(7, i, 0), sample_number(7, i, 1)}, direction = {1, 0, 0};
         if (i % 2)
-            direction = vector_subtract((Vector3){2 * random_at(7, i, 2), 0, random_at(7, i, 3)}, origin);
+            direction =
+                vector_subtract((Vector3){2 * sample_number(7, i, 2), 0, sample_number(7, i, 3)}, origin);
         rays[i] = verify_ray(run, origin, direction);
     }
     Scene *scene =
