@@ -92,9 +92,9 @@ static double color_error(Color color, Color expected)
 }
 
 // The first way in which a pixel is wrong.
-typedef enum { RIGHT, WRONG_OBJECT, WRONG_SHADOW, WRONG_PATH, WRONG_COLOR } Fault;
+typedef enum { RIGHT, WRONG_OBJECT, WRONG_SHADOW, WRONG_PATH, WRONG_COLOR } Mismatch;
 
-static Fault fault_of(const CertifySample *sample, size_t index, const Film *film, size_t pixel)
+static Mismatch mismatch_of(const CertifySample *sample, size_t index, const Film *film, size_t pixel)
 {
     const ReferencePixel *expected = &sample->pixels[index];
     if (film->object[pixel] != expected->object) return WRONG_OBJECT;
@@ -135,21 +135,21 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         const ReferencePixel *expected = &sample->pixels[i];
         const uint32_t *place = sample->places[i];
         const size_t pixel = (size_t)place[1] * film->width + place[0];
-        const Fault fault = fault_of(sample, i, film, pixel);
+        const Mismatch mismatch = mismatch_of(sample, i, film, pixel);
         const bool claimed = film->flag[pixel] != FLAG_UNCERTIFIED;
-        if (fault && claimed) wrong_decided_add(&errors, place, expected->margin);
+        if (mismatch && claimed) wrong_decided_add(&errors, place, expected->margin);
         if (reference_is_uncertain(expected)) {
             errors.unconfirmed += claimed;
-            errors.contradicted += claimed && fault;
+            errors.contradicted += claimed && mismatch;
             continue;
         }
         errors.compared++;
-        if (fault) {
-            ++*counts[fault];
+        if (mismatch) {
+            ++*counts[mismatch];
             errors.margin = fmax(errors.margin, expected->margin);
         }
         if (!expected->has_texture)
-            color_compare(&errors, vector_from(film->color + 3 * pixel), expected->color, place, fault);
+            color_compare(&errors, vector_from(film->color + 3 * pixel), expected->color, place, mismatch);
     }
     return errors;
 }

@@ -29,14 +29,14 @@ void certify_sample_close(CertifySample *sample);
 // largest channel, or of 1 if that is more. The color thus covers a checker's square or a shadow that is
 // seen in a mirror.
 //
-// These are the counts of pixels that violate the claim. A pixel counts once, as the first of these faults.
+// The comparison of a film with the claim.
 typedef struct {
-    size_t compared; // those that the reference decides
-    size_t object, shadow, path, color;
-    size_t colors;      // compared, of pixels without a texture, right or wrong
-    double right_color; // the largest error of a channel in right pixels
-    double wrong_color; // and in wrong pixels
-    uint32_t worst[2];  // the pixel with the larger of the two
+    size_t compared;                    // pixels that the reference decides
+    size_t object, shadow, path, color; // those that are wrong, each counted once by the first that is wrong
+    size_t colors;                      // compared, of pixels without a texture, right or wrong
+    double right_color;                 // the largest error of a channel in right pixels
+    double wrong_color;                 // and in wrong pixels
+    uint32_t worst[2];                  // the pixel with the larger of the two
     // The largest distance of a wrong pixel's exact ray from the curve where its answer changes, relative to
     // the hit's distance. Faults of single precision are at most some units of roundoff from it.
     double margin;
