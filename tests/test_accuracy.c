@@ -73,7 +73,7 @@ TEST(equal)
 {
     OwnedFilm reference = film_make(), variant = film_make();
     AccuracyErrors errors = compare(&reference, &variant);
-    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(accuracy_disqualifications(&errors), 0);
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT);
     assert_int_equal(errors.image.count, 3 * PIXELS);
@@ -92,7 +92,7 @@ TEST(wrong_objects)
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.object.edge, 2);
     assert_int_equal(errors.object.away, 0);
-    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(accuracy_disqualifications(&errors), 0);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_OBJECT];
     assert_true(worst->found && worst->x == 5 && worst->y == 0 && !worst->away);
     assert_true(worst->reference == 0 && worst->variant == 1);
@@ -112,7 +112,7 @@ TEST(wrong_objects)
     assert_int_equal(errors.surface_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.t_relative.largest == 0 && errors.shading.largest == 0);
     assert_near(errors.image.largest, 0.4, 1e-15);
-    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_OBJECT);
+    assert_int_equal(accuracy_disqualifications(&errors), DISQUALIFIED_OBJECT);
     assert_true(worst->x == 1 && worst->y == 1 && worst->away && worst->variant == (double)UINT32_MAX);
     assert_true(worst->variant_color[2] == 0.4 && worst->reference_color[2] == 0.5);
 }
@@ -125,7 +125,7 @@ TEST(wrong_shadows)
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.shadow.edge, 1);
     assert_int_equal(errors.shadow.away, 0);
-    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(accuracy_disqualifications(&errors), 0);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 1);
     assert_true(errors.shading.largest == 0);
 
@@ -135,7 +135,7 @@ TEST(wrong_shadows)
     errors = compare(&reference, &variant);
     assert_int_equal(errors.shadow.edge, 2);
     assert_int_equal(errors.shadow.away, 2);
-    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_SHADOW);
+    assert_int_equal(accuracy_disqualifications(&errors), DISQUALIFIED_SHADOW);
     const AccuracyWorst *worst = &errors.worst[ACCURACY_SHADOW];
     assert_true(worst->away && worst->x == 0 && worst->y == 3 && worst->light == 1 && worst->variant == 1);
 }
@@ -150,7 +150,7 @@ TEST(wrong_paths)
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.path.edge, 1);
     assert_int_equal(errors.path.away, 2);
-    assert_int_equal(accuracy_faults(&errors), 0);
+    assert_int_equal(accuracy_disqualifications(&errors), 0);
     assert_int_equal(errors.shading_pixels, NOTHING_FROM * HEIGHT - 3);
     assert_true(errors.shading.largest == 0 && errors.worst[ACCURACY_PATH].x == 2);
 }
@@ -212,7 +212,7 @@ TEST(unsound_pixels)
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(errors.nonfinite, 2);
     assert_int_equal(errors.negative, 2);
-    assert_int_equal(accuracy_faults(&errors), DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE);
+    assert_int_equal(accuracy_disqualifications(&errors), DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE);
     assert_int_equal(errors.image.count, 3 * PIXELS - 2);
     assert_true(isfinite(errors.image.rmse) && isfinite(errors.display.flip_mean));
     assert_true(isinf(errors.worst[ACCURACY_IMAGE].error) && errors.worst[ACCURACY_IMAGE].x == 3);

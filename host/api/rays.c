@@ -74,7 +74,7 @@ static void ray_batch_scale(void *context, size_t begin, size_t end)
     for (size_t i = begin; i < end && !reason; i++) {
         const size_t index = batch->first + i;
         ray_read(&batch->scaled[i], batch->rays, index);
-        reason = trace_ray_fault(&batch->scaled[i], batch->precision);
+        reason = trace_ray_why_not(&batch->scaled[i], batch->precision);
         if (!reason) {
             batch->scaled[i] = trace_ray_scaled(batch->scaled[i], batch->precision, &batch->exponents[i]);
             continue;

@@ -93,7 +93,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         double numbers[8] = {0};
         int count = line_numbers(&report, start, end, numbers);
         const TraceRay ray = ray_make(numbers, count);
-        const char *fault = trace_ray_fault(&ray, common->settings.precision);
+        const char *fault = trace_ray_why_not(&ray, common->settings.precision);
         if (count > 0 && count != 6 && count != 8)
             report_error(&report, start, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
                          count);

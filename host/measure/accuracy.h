@@ -107,6 +107,7 @@ typedef struct {
     AccuracyStatus status;
     AccuracyErrors errors;
     float *image;          // linear, 3 values per pixel; NULL if unavailable
+    double frame_seconds;  // the median
     unsigned disqualified; // the set of DISQUALIFIED_… for which its speed does not count
     unsigned pareto; // the set of 1 << AccuracyMeasure for which no other is as good in less median time
 } AccuracyVariant;
@@ -155,7 +156,7 @@ bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant);
 // Returns the plotted figure of a type, or the reason why it is unavailable.
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type);
 // Returns the set of DISQUALIFIED_… that follows from a variant's errors.
-unsigned accuracy_faults(const AccuracyErrors *errors);
-// Sets, from errors and times, each variant's disqualified and pareto, and a recommendation for each budget.
-// The runs of the variants must have been interleaved.
+unsigned accuracy_disqualifications(const AccuracyErrors *errors);
+// Sets, from errors and times, each variant's frame_seconds, disqualified and pareto, and a recommendation
+// for each budget. The runs of the variants must have been interleaved.
 void accuracy_classify(AccuracyScene *scene, const AccuracyBudgets *budgets);

@@ -51,12 +51,14 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
         return (Figure){errors->normal.percentile_999, no_surface};
     case ACCURACY_IMAGE:
         return (Figure){errors->image.rmse, errors->image.count > 0 ? NULL : "no value is finite"};
-    default:
-        return (Figure){.value = errors->display.flip_mean};
+    case ACCURACY_FLIP:
+    case ACCURACY_MEASURE_COUNT:
+        break;
     }
+    return (Figure){.value = errors->display.flip_mean};
 }
 
-unsigned accuracy_faults(const AccuracyErrors *errors)
+unsigned accuracy_disqualifications(const AccuracyErrors *errors)
 {
     return (errors->nonfinite > 0 ? DISQUALIFIED_NONFINITE : 0u) |
            (errors->negative > 0 ? DISQUALIFIED_NEGATIVE : 0u) |
@@ -70,17 +72,12 @@ static bool competes(const AccuracyVariant *variant)
            (variant->status == ACCURACY_MEASURED && variant->disqualified == 0);
 }
 
-static double frame_median(const AccuracyVariant *variant)
-{
-    return series_summarize(&variant->row->times.frame).median;
-}
-
 // Returns whether a is at least as good as b and better in error or time. The reference has no error, so its
 // time alone decides.
 static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyMeasure type)
 {
     Figure error_a = accuracy_figure(a, type), error_b = accuracy_figure(b, type);
-    double time_a = frame_median(a), time_b = frame_median(b);
+    const double time_a = a->frame_seconds, time_b = b->frame_seconds;
     if (a->status == ACCURACY_REFERENCE) return time_a < time_b;
     if (error_a.why_not || error_a.value > error_b.value || time_a > time_b) return false;
     return error_a.value < error_b.value || time_a < time_b;
@@ -89,8 +86,8 @@ static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, Accura
 static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant *variant,
                               AccuracyMeasure type)
 {
-    if (variant->status != ACCURACY_MEASURED || variant->disqualified) return false;
-    if (accuracy_figure(variant, type).why_not) return false;
+    // the reference has no figure
+    if (!competes(variant) || accuracy_figure(variant, type).why_not) return false;
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *other = &scene->variants[i];
         if (other != variant && competes(other) && dominates(other, variant, type)) return false;
@@ -116,7 +113,7 @@ static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, do
     for (size_t i = 0; i < count; i++) {
         if (!is_within(&scene->variants[i], budget, measure)) continue;
         if (pick.variant == SIZE_MAX ||
-            frame_median(&scene->variants[i]) < frame_median(&scene->variants[pick.variant]))
+            scene->variants[i].frame_seconds < scene->variants[pick.variant].frame_seconds)
             pick.variant = i;
     }
     pick.times = memory_allocate_zeroed(count, sizeof *pick.times);
@@ -137,7 +134,9 @@ void accuracy_classify(AccuracyScene *scene, const AccuracyBudgets *budgets)
 {
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];
-        variant->disqualified = variant->status == ACCURACY_MEASURED ? accuracy_faults(&variant->errors) : 0;
+        variant->frame_seconds = series_summarize(&variant->row->times.frame).median;
+        variant->disqualified =
+            variant->status == ACCURACY_MEASURED ? accuracy_disqualifications(&variant->errors) : 0;
     }
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];

@@ -70,11 +70,13 @@ static double pixel_share(const ErrorBudget *budget, const double reference[3], 
         return range > 0 ? vector_dot(error, error) / 3 / (range * range) : 0; // the mean of the channels
     case ERROR_MAX:
         return vector_largest(error) > budget->limit;
-    default:
-        display_color(colors[0], reference, display_values);
-        display_color(colors[1], test, display_values);
-        return flip_of_colors(colors[0], colors[1]);
+    case ERROR_FLIP:
+    case ERROR_METRIC_COUNT:
+        break;
     }
+    display_color(colors[0], reference, display_values);
+    display_color(colors[1], test, display_values);
+    return flip_of_colors(colors[0], colors[1]);
 }
 
 double sample_rmse_floor(const Sampling *sampling)
@@ -113,7 +115,9 @@ SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, 
         return (SampleVerdict){summary.rmse, range * sqrt(bound), range * sqrt(bound) <= budget->limit};
     case ERROR_MAX:
         return (SampleVerdict){summary.largest, bound, summary.largest <= budget->limit};
-    default:
-        return (SampleVerdict){mean, flip_spread * bound, flip_spread * bound <= budget->limit};
+    case ERROR_FLIP:
+    case ERROR_METRIC_COUNT:
+        break;
     }
+    return (SampleVerdict){mean, flip_spread * bound, flip_spread * bound <= budget->limit};
 }

@@ -24,7 +24,8 @@ typedef struct {
 double mean_upper_bound(const double *values, size_t count, double risk);
 
 typedef struct {
-    double error; // the sample's error
+    // The sample's error. Infinite if a pixel or, for ERROR_RMSE, the range of the colors is not finite.
+    double error;
     // The bound on the whole image's error, except for the risk. For ERROR_MAX, the bound on the share of
     // pixels beyond the limit. Infinite if a pixel is not finite.
     double bound;

@@ -70,7 +70,7 @@ static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
     return cell;
 }
 
-// What every precision renders a sample of.
+// The image of which every precision renders a sample.
 typedef struct {
     Pilot *pilot;
     Compute *compute;

@@ -12,8 +12,8 @@ bool settings_fit(const RenderSettings *settings, const Compute *compute, Messag
         return message_error(messages, "bounces must be at most %d, not %u", BOUNCES_MAX,
                              settings->bounce_count);
     if (settings->perturb_scale > PERTURB_SCALE_MAX)
-        return message_error(messages, "errors can be at most %d times as large, not %u", PERTURB_SCALE_MAX,
-                             settings->perturb_scale);
+        return message_error(messages, "the perturbation's scale must be at most %d, not %u",
+                             PERTURB_SCALE_MAX, settings->perturb_scale);
     if (device->embedded_profile &&
         (settings->precision == PRECISION_STRICT || settings->precision == PRECISION_CERTIFIED))
         return message_error(messages,

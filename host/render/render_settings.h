@@ -54,10 +54,10 @@ typedef struct {
     void *stop_context;
     Stage *stage; // shows the progress before the first launch; may be NULL
 
-    // What only tests and measurements set.
+    // Only tests and measurements set these.
     FeatureSet extra_features; // built in beyond the scene's own
-    uint32_t
-        perturb_seed; // unless 0, injects rounding errors that OpenCL permits (kernels/numerics/perturb.h)
+    // Unless 0, injects rounding errors that OpenCL permits (kernels/numerics/perturb.h).
+    uint32_t perturb_seed;
     uint32_t perturb_scale; // multiplies those errors, up to PERTURB_SCALE_MAX; 0 means 1
     uint32_t band_rows;     // a fixed number of rows per band; 0 sizes bands by time
 } RenderSettings;

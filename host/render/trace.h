@@ -45,6 +45,6 @@ enum { RAYS_OF_THREAD_MIN = 4096 }; // of work on the host, a few tenths of a mi
 // number of the precision. A t of the scaled ray is ldexp(t, *exponent) for the original t.
 TraceRay trace_ray_scaled(TraceRay ray, Precision precision, int *exponent);
 // Returns why the ray cannot be scaled and traced at the precision, or NULL.
-const char *trace_ray_fault(const TraceRay *ray, Precision precision);
+const char *trace_ray_why_not(const TraceRay *ray, Precision precision);
 // Scales the hit's numbers back to lengths of the original direction.
 void trace_hit_unscale(TraceHit *hit, int exponent);

@@ -15,7 +15,7 @@ static double farthest_of(Precision precision)
     return precision < PRECISION_DOUBLE ? (double)FLT_MAX : DBL_MAX;
 }
 
-const char *trace_ray_fault(const TraceRay *ray, Precision precision)
+const char *trace_ray_why_not(const TraceRay *ray, Precision precision)
 {
     if (!vector_is_within(ray->origin, farthest_of(precision)) ||
         !vector_is_within(ray->direction, DBL_MAX) || !isfinite(ray->tmin) || isnan(ray->tmax))
