@@ -511,8 +511,9 @@ TEST(hard_cases_are_decided)
 {
     if (!tests_are_long() || !probe_has(PRECISION_CERTIFIED)) skip();
     Pictures pictures = {0};
-    const VerifySettings settings = {
-        .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
+    const VerifySettings settings = {.render = film_settings(1, 1, PRECISION_SINGLE),
+                                     .receive_image = picture_compare,
+                                     .context = &pictures};
     VerifyKernels kernels = {0};
     verify_run(&probe_compute, &settings, &(VerifySink){.receive = case_print}, &kernels);
     print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not uncertified\n",

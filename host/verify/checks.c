@@ -149,7 +149,7 @@ static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t,
 }
 
 // Returns the angle between two nearly parallel vectors. The second is a unit vector.
-static double turned_by(Quad3 normal, Quad3 exact)
+static double normal_angle(Quad3 normal, Quad3 exact)
 {
     Vector3 unit = quad3_rounded(exact);
     bool opposite = vector_dot(quad3_rounded(normal), unit) < 0;
@@ -173,10 +173,10 @@ void verify_check_surface(VerifyRun *run, const Object *object, const TraceRay *
     for (int i = 0; i < surface.count; i++) {
         const ReferenceSheet *sheet = &surface.sheets[i];
         if (sheet->distance > distance + bound) continue;
-        double turned = turned_by(normal, sheet->normal);
+        double angle = normal_angle(normal, sheet->normal);
         double tolerance =
             8 * verify_roundoff(run) * surface.normal_condition + bound / (double)sheet->curvature_radius;
-        least_part = fmin(least_part, turned / tolerance);
+        least_part = fmin(least_part, angle / tolerance);
     }
     run->result->wrong_normals += !(least_part <= 1);
     run->result->worst_normal_ratio = fmax(run->result->worst_normal_ratio, least_part);

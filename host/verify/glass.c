@@ -22,8 +22,8 @@ void verify_nested_spheres(VerifyRun *run)
     static const double ratios[] = {1 + 4e-5, 1 + 0x1p-16}, scales[] = {1, 1000, 0.001};
     const uint32_t sphere_then_coat[] = {1, 0};
     const uint32_t expected = passed_path(sphere_then_coat, 2);
-    for (size_t k = 0; k < 6; k++) {
-        double scale = scales[k % 3], ratio = ratios[k / 3];
+    for (size_t k = 0; k < COUNT_OF(ratios) * COUNT_OF(scales); k++) {
+        const double ratio = ratios[k / COUNT_OF(scales)], scale = scales[k % COUNT_OF(scales)];
         Scene *scene =
             verify_scene(run, "ambient: [1, 1, 1]\n"
                               "materials:\n  red: {color: [1, 0, 0]}\n"
@@ -119,8 +119,8 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
         }
         Quad3 refracted = quad3(second[i].refracted_direction);
         Vector3 off = quad3_rounded(quad3_subtract(refracted, d));
-        // an error of two cosines with a root each, and of a unit vector with a root and a quotient
-        double bound = run->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
+        // two cosines have a root each, and a unit vector has a root and a quotient
+        double bound = 4 + (run->inexact ? 3 * ROOT_ERROR + QUOTIENT_ERROR : 0);
         verify_record(run, vector_largest(off) / verify_roundoff(run), bound, "u");
     }
     // most of the targets lie within the body

@@ -1,4 +1,5 @@
 // Images of Phong's highlights, from dull to a thousandth of a radian wide.
+#include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>
 
@@ -18,10 +19,10 @@ void verify_highlights(VerifyRun *run)
     static const double powers[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
     // the tier's bound, and the power up to which it holds
     const double power_max = run->tier == TIER_B ? 1e4 : 1e6, bound = run->tier == TIER_B ? 2e-3 : 1e-4;
-    const Vector3 eye = {0.4, -0.3, 5}, light_beside = {-0.3, -0.2, -1}, light_behind = {1, 0.1, 0.3};
-    for (size_t k = 0; k < 16; k++) {
-        double power = powers[k / 2];
-        bool closely = k % 2;
+    const Vector3 eye = {0.4, -0.3, 5}, light_near_eye = {-0.3, -0.2, -1}, light_behind = {1, 0.1, 0.3};
+    for (size_t k = 0; k < 2 * COUNT_OF(powers); k++) {
+        const double power = powers[k / 2];
+        const bool closely = k % 2;
         Scene *scene =
             verify_scene(run,
                          "lights:\n  - directional: {direction: [0, 0, 1]}\n"
@@ -29,7 +30,7 @@ void verify_highlights(VerifyRun *run)
                          "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
                          power);
         // the whole sphere is lit from the side and partly behind, the close-up from next to the eye
-        Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
+        Vector3 direction = vector_normalize(closely ? light_near_eye : light_behind);
         scene->lights.items[0].direction = direction;
         const Vector3 center = {0, 0, 0};
         scene->camera = verify_camera(eye, center, 30);

@@ -52,7 +52,7 @@ static Scene *every_shape_scene(VerifyRun *run)
 }
 
 // Counts the objects that no pixel shows, because two empty images would agree.
-static void demand_every_object(VerifyRun *run, const Scene *scene, const Film *image)
+static void check_every_object(VerifyRun *run, const Scene *scene, const Film *image)
 {
     for (size_t object = 0; object < scene->objects.count; object++) {
         size_t pixel = 0;
@@ -87,7 +87,7 @@ static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
 }
 
 // Counts the pixels that differ between two images, bit for bit except for the sign of a zero.
-static void compare(VerifyRun *run, const Film *a, const View *view)
+static void check_view(VerifyRun *run, const Film *a, const View *view)
 {
     for (size_t i = 0; i < film_pixel_count(a); i++) {
         size_t column = i % a->width, other = view->mirrored ? i + a->width - 1 - 2 * column : i;
@@ -100,14 +100,14 @@ void verify_scaled_scenes(VerifyRun *run)
     static const int exponents[] = {-20, -10, -3, 3, 10, 20};
     Scene *scene = every_shape_scene(run);
     Film image = verify_render(run, scene, false, 160, 120);
-    demand_every_object(run, scene, &image);
+    check_every_object(run, scene, &image);
     for (size_t i = 0; i < COUNT_OF(exponents); i++) {
         const CaseMemory before = run->memory;
         double scale = ldexp(1, exponents[i]);
         Scene *scaled = every_shape_scene(run);
         scene_scale(scaled, scale);
         Film other = verify_render(run, scaled, i % 2, 160, 120);
-        compare(run, &image, &(View){&other, scale, false});
+        check_view(run, &image, &(View){&other, scale, false});
         verify_release_since(run, &before);
     }
 }
@@ -133,7 +133,7 @@ static bool hits_nearby(VerifyRun *run, Renderer *opened, Vector3 direction, uin
     return false;
 }
 
-static bool shadow_edge_beside(const Film *image, size_t pixel, size_t light)
+static bool has_shadow_edge_near(const Film *image, size_t pixel, size_t light)
 {
     size_t column = pixel % image->width, row = pixel / image->width;
     uint32_t here = image->shadow[pixel * image->light_count + light];
@@ -156,7 +156,7 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
             size_t k = i * image->light_count + light;
             if (image->shadow[k] == turned->shadow[k]) continue;
             same = false;
-            run->result->wrong += !shadow_edge_beside(image, i, light);
+            run->result->wrong += !has_shadow_edge_near(image, i, light);
         }
         for (size_t k = 3 * i; k < 3 * i + 3 && same; k++)
             verify_record(run, fabs(image->color[k] - turned->color[k]), 1e-5, "of 1");
@@ -194,13 +194,13 @@ void verify_mirrored_scenes(VerifyRun *run)
         Scene *scene = unchecked_scene(run), *mirrored = unchecked_scene(run);
         scene_mirror(mirrored);
         Film image = verify_render(run, scene, false, width, 128);
-        demand_every_object(run, scene, &image);
+        check_every_object(run, scene, &image);
         Film other = verify_render(run, mirrored, false, width, 128);
-        compare(run, &image, &(View){&other, 1, true});
+        check_view(run, &image, &(View){&other, 1, true});
     }
     Scene *scene = plain_scene(run), *turned = plain_scene(run);
     Film image = verify_render(run, scene, false, 256, 192);
-    demand_every_object(run, scene, &image);
+    check_every_object(run, scene, &image);
     Renderer *opened = verify_open(run, scene, false);
     for (unsigned turns = 1; turns < 3; turns++) {
         scene_turn_axes(turned);

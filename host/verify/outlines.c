@@ -113,8 +113,8 @@ void verify_apex(VerifyRun *run)
             if (!verify_pixel_found(&image, i)) continue;
             const double u = verify_roundoff(run);
             double length = vector_length(vector_from(image.normal + 3 * i));
-            // + 6 u: a root off by 3 ulp; + 4 u: a quotient off by 2
-            verify_record(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
+            const double bound = 4 + (run->inexact ? ROOT_ERROR + QUOTIENT_ERROR : 0);
+            verify_record(run, fabs(length - 1) / u, bound, "u");
         }
     }
 }

@@ -15,7 +15,7 @@ Scene *verify_rays_scene(VerifyRun *run, const VerifyRays *set)
     return scene;
 }
 
-static double nudged(const VerifyRun *run, double value, double toward)
+static double neighbor_toward(const VerifyRun *run, double value, double toward)
 {
     return verify_is_double(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
 }
@@ -34,9 +34,9 @@ static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const Veri
     for (size_t k = 0; k < 2; k++) {
         double x = *moved[k];
         if (x == 0) continue;
-        *moved[k] = nudged(run, x, copysign(INFINITY, x));
+        *moved[k] = neighbor_toward(run, x, copysign(INFINITY, x));
         array_push(*tests, item);
-        *moved[k] = nudged(run, x, 0);
+        *moved[k] = neighbor_toward(run, x, 0);
         array_push(*tests, item);
         *moved[k] = x;
     }

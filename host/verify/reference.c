@@ -104,9 +104,9 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
     // hit is recomputed with the hit point as the ray's origin.
     const ReferenceRay nearby = {reference_point(ray, hit.t), ray->direction, ray->tmin - hit.t,
                                  ray->tmax - hit.t};
-    ReferenceHit again = hit_from(object, &nearby);
-    if (again.found) again.t += hit.t;
-    return again;
+    ReferenceHit refined = hit_from(object, &nearby);
+    if (refined.found) refined.t += hit.t;
+    return refined;
 }
 
 void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray)

@@ -15,7 +15,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     return shaded_color(&world, &surface, (double)hit.margin, NULL);
 }
 
-// How strongly the body around a ray, and the one around that, absorb light.
+// The absorption of light per length in the body around a ray and in the one around that.
 typedef struct {
     Color density, outer;
 } Medium;

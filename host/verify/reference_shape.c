@@ -6,8 +6,8 @@ void hit_reduce_margin(ReferenceHit *hit, Quad margin)
     hit->margin = quad_minimum(hit->margin, quad_absolute(margin));
 }
 
-// A hit starts or ceases to count when the ray's start or end crosses the surface. The margin is twice the
-// height of these over the tangent plane of the hit.
+// Keeps the hit at t if it is the nearest. A hit starts or ceases to count when the ray's start or end
+// crosses the surface, so the margin is twice the height of these over the tangent plane of the hit.
 void hit_keep_nearest(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius)
 {
     if (hit->found && t >= hit->t) return;

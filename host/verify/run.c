@@ -202,8 +202,8 @@ const TraceHit *verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const
 {
     const RenderSettings settings = scene_settings(run, bvh, 0, 0);
     TraceHit *hits = verify_allocate(run, count, sizeof *hits);
-    scene_assign(run, &run->tracer, scene, &settings);
-    verify_trace_opened(run, run->tracer, rays, count, hits);
+    scene_assign(run, &run->ray_renderer, scene, &settings);
+    verify_trace_opened(run, run->ray_renderer, rays, count, hits);
     return hits;
 }
 
@@ -223,10 +223,10 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
     const unsigned aovs = AOVS_OF_HIT | AOVS_OF_PATH;
     Film film;
     const RenderSettings settings = scene_settings(run, bvh, width, height);
-    if (run->settings->picture) run->settings->picture(run->settings->context, scene, &settings);
-    scene_assign(run, &run->painter, scene, &settings);
-    if (run->painter && renderer_render_film(run->painter, aovs, &film))
-        run->kernels->render_hash = renderer_report(run->painter)->kernel_hash;
+    if (run->settings->receive_image) run->settings->receive_image(run->settings->context, scene, &settings);
+    scene_assign(run, &run->image_renderer, scene, &settings);
+    if (run->image_renderer && renderer_render_film(run->image_renderer, aovs, &film))
+        run->kernels->render_hash = renderer_report(run->image_renderer)->kernel_hash;
     else
         film = film_allocate(width, height, (uint32_t)scene->lights.count, aovs);
     array_push(run->memory.films, film);
@@ -252,7 +252,7 @@ bool verify_same_bits(const TraceHit *a, const TraceHit *b)
 }
 
 // Returns an error over its bound, which may be 0.
-static double part_of_bound(double error, double bound)
+static double bound_share(double error, double bound)
 {
     return bound > 0 ? error / bound : error > 0 ? INFINITY : 0;
 }
@@ -262,7 +262,7 @@ void verify_record(VerifyRun *run, double error, double bound, const char *unit)
     VerifyResult *result = run->result;
     if (!(error <= bound)) result->wrong++;
     if (bound == INFINITY) return;
-    if (part_of_bound(error, bound) > part_of_bound(result->worst, result->bound) ||
+    if (bound_share(error, bound) > bound_share(result->worst, result->bound) ||
         (result->worst == 0 && bound > result->bound)) {
         result->worst = error;
         result->bound = bound;

@@ -4,24 +4,27 @@
 #include "host/base/array.h"
 #include "host/verify/verify.h"
 
-// What a case has allocated.
+// The memory that a case has allocated.
 typedef struct {
     ARRAY_OF(void *) blocks;
     ARRAY_OF(Scene *) scenes;
     ARRAY_OF(Film) films;
 } CaseMemory;
 
+// The largest errors of quotients and roots that OpenCL C allows, 2 and 3 ulp, in units of roundoff.
+enum { QUOTIENT_ERROR = 4, ROOT_ERROR = 6 };
+
 typedef struct {
     Compute *compute;
     const VerifySettings *settings;
     VerifyTier tier;
-    bool inexact; // quotients and roots are off by as much as OpenCL C allows, up to 2 and 3 ulp
+    bool inexact; // quotients and roots are off by as much as OpenCL C allows
     VerifyResult *result;
     VerifyKernels *kernels;
     CaseMemory memory;
     // The renderers of the last scenes of verify_trace and verify_render, or NULL. The next scene reuses
     // them with their kernels, because loading kernels takes longer than most scenes.
-    Renderer *tracer, *painter;
+    Renderer *ray_renderer, *image_renderer;
 } VerifyRun;
 
 // The checks of a case that are not in the tables. Each counts its faults in the run's result.

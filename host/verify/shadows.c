@@ -54,8 +54,11 @@ void verify_thin_plate(VerifyRun *run)
     Scene *scene = verify_scene(run, "lights:\n  - point: {position: [0.5, 0.5, -2]}\n"
                                      "  - directional: {direction: [0.1, 0.2, 1]}\n"
                                      "objects:\n  - box: {min: [0, 0, 0], max: [1, 1, 1e-6]}\n");
-    for (size_t k = 0; k < 4; k++) {
-        bool above = k & 1, light_above = k & 2;
+    static const struct {
+        bool above, light_above;
+    } sides[] = {{false, false}, {true, false}, {false, true}, {true, true}};
+    for (size_t k = 0; k < COUNT_OF(sides); k++) {
+        const bool above = sides[k].above, light_above = sides[k].light_above;
         const Vector3 eye = {0.5, 0.5, above ? 2 : -2}, center = {0.5, 0.5, 0};
         scene->camera = verify_camera(eye, center, 40);
         scene->lights.items[0].position.z = light_above ? 2 : -2;

@@ -114,6 +114,6 @@ void verify_run(Compute *compute, const VerifySettings *settings, const VerifySi
         verify_release(&run);
         if (!sink->receive(sink->context, &result)) break;
     }
-    renderer_close(run.tracer);
-    renderer_close(run.painter);
+    renderer_close(run.ray_renderer);
+    renderer_close(run.image_renderer);
 }

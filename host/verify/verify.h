@@ -18,7 +18,7 @@ typedef struct {
     bool lean;             // build kernels for each scene's needs, not one for all scenes
     bool quick;            // a sixteenth of the random rays, and fewer pixels
     // Receives the scene and settings of each image, for further checks; or NULL.
-    void (*picture)(void *context, const Scene *scene, const RenderSettings *settings);
+    void (*receive_image)(void *context, const Scene *scene, const RenderSettings *settings);
     void *context;
 } VerifySettings;
 

@@ -19,7 +19,7 @@ static Scene *tiled_scene(VerifyRun *run, Vector3 place)
     return scene;
 }
 
-static Film view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
+static Film view_render(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Vector3 up, double fov)
 {
     Scene *scene = tiled_scene(run, place);
     scene->camera = verify_camera(eye, look_at, fov);
@@ -28,7 +28,7 @@ static Film view(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look_at, Ve
     return image;
 }
 
-static void compare(VerifyRun *run, const Film *a, const Film *b)
+static void check_same(VerifyRun *run, const Film *a, const Film *b)
 {
     for (size_t i = 0; i < film_pixel_count(a); i++) {
         run->result->differing += a->object[i] != b->object[i] || a->t[i] != b->t[i];
@@ -46,16 +46,16 @@ static void check_views_without_up(VerifyRun *run)
     const Vector3 here = {0, 0, 0};
     for (size_t k = 0; k < COUNT_OF(views); k++) {
         Vector3 toward = vector_subtract(views[k].look_at, views[k].eye);
-        Film expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
+        Film expected = view_render(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
         const Vector3 ups[] = {toward, vector_scale(toward, -0.5), {0, 0, 0}};
         for (size_t i = 0; i < COUNT_OF(ups); i++) {
-            Film image = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
-            compare(run, &image, &expected);
+            Film image = view_render(run, here, views[k].eye, views[k].look_at, ups[i], 40);
+            check_same(run, &image, &expected);
         }
         if (k == 0) {
             // an `up` that is nearly parallel to the view is valid
-            Film image = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
-            compare(run, &image, &expected);
+            Film image = view_render(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
+            check_same(run, &image, &expected);
         }
     }
 }
@@ -64,7 +64,7 @@ static void check_views_without_up(VerifyRun *run)
 static void check_tiles(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
-    Film image = view(run, here, eye, below, up, 60);
+    Film image = view_render(run, here, eye, below, up, 60);
     size_t counts[2] = {0};
     for (size_t i = 0; i < film_pixel_count(&image); i++) {
         if (image.object[i] != 0) continue;
@@ -86,11 +86,11 @@ static void check_extremes(VerifyRun *run)
     static const double fovs[] = {1e-3, 179.9};
     const size_t middle = (SIDE * SIDE - 1) / 2;
     for (size_t i = 0; i < COUNT_OF(fovs); i++) {
-        Film image = view(run, here, eye, here, up, fovs[i]);
+        Film image = view_render(run, here, eye, here, up, fovs[i]);
         run->result->wrong += image.object[middle] != 1 || !(image.color[3 * middle] > 0);
     }
-    Film near = view(run, here, eye, here, up, 40);
-    Film away = view(run, far, vector_add(far, eye), far, up, 40);
+    Film near = view_render(run, here, eye, here, up, 40);
+    Film away = view_render(run, far, vector_add(far, eye), far, up, 40);
     for (size_t i = 0; i < film_pixel_count(&near); i++)
         run->result->differing += near.object[i] != away.object[i] || near.t[i] != away.t[i];
     Scene *scene = tiled_scene(run, here);

@@ -40,11 +40,11 @@ static void surface_box(const Object *object, Quad3 point, ReferenceSurface *sur
     surface_measure(surface, center, size, size);
     for (int axis = 0; axis < 3; axis++) {
         int next = (axis + 1) % 3, last = (axis + 2) % 3;
-        Quad beside = quad_hypotenuse(quad_outside(at[next], low[next], high[next]),
-                                      quad_outside(at[last], low[last], high[last]));
+        Quad outside = quad_hypotenuse(quad_outside(at[next], low[next], high[next]),
+                                       quad_outside(at[last], low[last], high[last]));
         Quad3 normal = {axis == 0, axis == 1, axis == 2};
-        surface_add(surface, quad_hypotenuse(at[axis] - low[axis], beside), normal, UNBOUNDED);
-        surface_add(surface, quad_hypotenuse(at[axis] - high[axis], beside), normal, UNBOUNDED);
+        surface_add(surface, quad_hypotenuse(at[axis] - low[axis], outside), normal, UNBOUNDED);
+        surface_add(surface, quad_hypotenuse(at[axis] - high[axis], outside), normal, UNBOUNDED);
     }
 }
 

@@ -1,8 +1,8 @@
 #include "host/verify/random_shape.h"
 #include "host/verify/reference_shape.h"
 
-// Twice the distance from the rim, within the plane, is about (d^2 / r^2 - 1) r. Between the ray's line and
-// the rim's nearest tangent it is shorter by approach / spread.
+// Finds the hit with a disc. Its margin is twice the distance from the rim, which within the plane is about
+// (d^2 / r^2 - 1) r. Between the ray's line and the rim's nearest tangent it is shorter by approach / spread.
 void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad t;

@@ -28,7 +28,7 @@ static double triangle_longest_side(const Vector3 corners[3])
     return longest;
 }
 
-// Cramer's rule for  u (b - a) + v (c - a) - t d = o - a.
+// Solves  u (b - a) + v (c - a) - t d = o - a  by Cramer's rule.
 static void hit_triangle(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     const Vector3 *vertices = object->as.triangle.vertices;
@@ -65,7 +65,7 @@ static void hit_triangle(const Object *object, const ReferenceRay *ray, Referenc
     hit->shading_normal = quad3_unit(smooth);
 }
 
-// The triangle's plane.
+// Measures the triangle's plane.
 static void surface_triangle(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
     const Vector3 *vertices = object->as.triangle.vertices;
