@@ -1,273 +1,149 @@
 #include "host/measure/accuracy.h"
 
 #include "host/base/memory.h"
-#include "host/base/percentile.h"
-#include "host/base/ulp.h"
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-// A map with `stride` values per pixel.
-typedef struct {
-    const uint32_t *values;
-    uint32_t width, height, stride, offset;
-} ValueMap;
+const char *const accuracy_status_names[ACCURACY_STATUS_COUNT] = {"measured", "reference", "unavailable"};
 
-static uint32_t map_at(const ValueMap *map, size_t x, size_t y)
+void accuracy_scene_free(AccuracyScene *scene)
 {
-    return map->values[(y * map->width + x) * map->stride + map->offset];
+    for (size_t i = 0; i < scene->variant_count; i++)
+        free(scene->variants[i].image);
+    for (size_t i = 0; i < scene->recommendation_count; i++)
+        free(scene->recommendations[i].times);
+    free(scene->variants);
+    free(scene->reference.image);
+    accuracy_edges_free(&scene->edges);
+    *scene = (AccuracyScene){0};
 }
 
-static bool differs_from_neighbor(const ValueMap *map, size_t x, size_t y)
+static double sum_of(EdgeCount count)
 {
-    uint32_t value = map_at(map, x, y);
-    return (x > 0 && map_at(map, x - 1, y) != value) ||
-           (x + 1 < map->width && map_at(map, x + 1, y) != value) ||
-           (y > 0 && map_at(map, x, y - 1) != value) ||
-           (y + 1 < map->height && map_at(map, x, y + 1) != value);
+    return (double)count.edge + (double)count.away;
 }
 
-// Marks the map's edges in `edges`, which has the map's layout. Returns the number of pixels at edges.
-static size_t edges_mark(const ValueMap *map, bool *edges)
+Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
 {
-    size_t count = 0;
-    for (size_t y = 0; y < map->height; y++)
-        for (size_t x = 0; x < map->width; x++) {
-            if (!differs_from_neighbor(map, x, y)) continue;
-            // the pixel and those around it
-            for (size_t v = y > 0 ? y - 1 : 0; v <= y + 1 && v < map->height; v++)
-                for (size_t u = x > 0 ? x - 1 : 0; u <= x + 1 && u < map->width; u++) {
-                    bool *edge = &edges[(v * map->width + u) * map->stride + map->offset];
-                    count += !*edge;
-                    *edge = true;
-                }
-        }
-    return count;
-}
-
-// Returns the map of the edges of a film's layer with `stride` values per pixel, and their numbers in
-// `counts`.
-static bool *layer_edges(const Film *film, const uint32_t *values, uint32_t stride, size_t *counts)
-{
-    bool *edges = memory_allocate_zeroed(film_pixel_count(film) * stride, sizeof *edges);
-    ValueMap map = {values, film->width, film->height, stride, 0};
-    for (; map.offset < stride; map.offset++)
-        counts[map.offset] = edges_mark(&map, edges);
-    return edges;
-}
-
-void accuracy_edges_find(AccuracyEdges *edges, const Film *reference)
-{
-    *edges = (AccuracyEdges){0};
-    if (reference->object)
-        edges->silhouette = layer_edges(reference, reference->object, 1, &edges->silhouette_pixels);
-    if (reference->path) edges->path = layer_edges(reference, reference->path, 1, &edges->path_pixels);
-    if (!reference->shadow) return;
-    const uint32_t lights = reference->light_count;
-    edges->shadow_edge_pixels = memory_allocate_zeroed(lights, sizeof(size_t));
-    edges->shadow = layer_edges(reference, reference->shadow, lights, edges->shadow_edge_pixels);
-}
-
-void accuracy_edges_free(AccuracyEdges *edges)
-{
-    free(edges->silhouette);
-    free(edges->shadow);
-    free(edges->path);
-    free(edges->shadow_edge_pixels);
-    *edges = (AccuracyEdges){0};
-}
-
-void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negative)
-{
-    *nonfinite = *negative = 0;
-    for (size_t i = 0; i < film_pixel_count(film); i++) {
-        const double *color = film->color + 3 * i;
-        *nonfinite += !isfinite(color[0]) || !isfinite(color[1]) || !isfinite(color[2]);
-        *negative += color[0] < 0 || color[1] < 0 || color[2] < 0;
+    const AccuracyErrors *errors = &variant->errors;
+    if (variant->status == ACCURACY_REFERENCE)
+        return (Figure){.why_not = "it is the reference that the others are compared with"};
+    if (variant->status == ACCURACY_UNAVAILABLE) return (Figure){.why_not = variant->row->failure};
+    if (errors->why_colors_only && type != ACCURACY_IMAGE && type != ACCURACY_FLIP)
+        return (Figure){.why_not = errors->why_colors_only};
+    const char *no_surface = errors->surface_pixels > 0 ? NULL : "no pixel shows the same object";
+    switch (type) {
+    case ACCURACY_OBJECT:
+        return (Figure){.value = sum_of(errors->object)};
+    case ACCURACY_SHADOW:
+        return (Figure){.value = sum_of(errors->shadow)};
+    case ACCURACY_PATH:
+        return (Figure){.value = sum_of(errors->path)};
+    case ACCURACY_SHADING:
+        return (Figure){errors->shading.rmse,
+                        errors->shading_pixels > 0 ? NULL : "no pixel agrees with the reference"};
+    case ACCURACY_T:
+        return (Figure){errors->t_relative.percentile_999, no_surface};
+    case ACCURACY_NORMAL:
+        return (Figure){errors->normal.percentile_999, no_surface};
+    case ACCURACY_IMAGE:
+        return (Figure){errors->image.rmse, errors->image.count > 0 ? NULL : "no value is finite"};
+    case ACCURACY_FLIP:
+    case ACCURACY_MEASURE_COUNT:
+        break;
     }
+    return (Figure){.value = errors->display.flip_mean};
 }
 
-typedef struct {
-    const Film *reference, *variant;
-    const AccuracyEdges *edges;
-    AccuracyErrors *errors;
-    // Values of the pixels that hit the reference's object:
-    double *expected, *found; // the colors of the shaded ones
-    float *t_relative, *t_ulps, *normal;
-} FilmComparison;
-
-// Returns the error of the channel in which a pixel's colors differ most, and its values.
-static AccuracyWorst color_worst(const FilmComparison *comparison, size_t pixel)
+unsigned accuracy_disqualifications(const AccuracyErrors *errors)
 {
-    AccuracyWorst worst = {.error = -1};
-    for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
-        const double reference = comparison->reference->color[i], variant = comparison->variant->color[i];
-        const double error = value_error(reference, variant);
-        if (error > worst.error)
-            worst = (AccuracyWorst){.error = error, .reference = reference, .variant = variant};
+    return (errors->nonfinite > 0 ? DISQUALIFIED_NONFINITE : 0u) |
+           (errors->negative > 0 ? DISQUALIFIED_NEGATIVE : 0u) |
+           (errors->object.away > 0 ? DISQUALIFIED_OBJECT : 0u) |
+           (errors->shadow.away > 0 ? DISQUALIFIED_SHADOW : 0u);
+}
+
+static bool competes(const AccuracyVariant *variant)
+{
+    return variant->status == ACCURACY_REFERENCE ||
+           (variant->status == ACCURACY_MEASURED && variant->disqualified == 0);
+}
+
+// Returns whether a is at least as good as b and better in error or time. The reference has no error, so its
+// time alone decides.
+static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyMeasure type)
+{
+    Figure error_a = accuracy_figure(a, type), error_b = accuracy_figure(b, type);
+    const double time_a = a->frame_seconds, time_b = b->frame_seconds;
+    if (a->status == ACCURACY_REFERENCE) return time_a < time_b;
+    if (error_a.why_not || error_a.value > error_b.value || time_a > time_b) return false;
+    return error_a.value < error_b.value || time_a < time_b;
+}
+
+static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant *variant,
+                              AccuracyMeasure type)
+{
+    // the reference has no figure
+    if (!competes(variant) || accuracy_figure(variant, type).why_not) return false;
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        const AccuracyVariant *other = &scene->variants[i];
+        if (other != variant && competes(other) && dominates(other, variant, type)) return false;
     }
-    return worst;
+    return true;
 }
 
-// Keeps the error if it is the worst of its type so far. An error away from edges is worse than any at edges.
-static void worst_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel,
-                         const AccuracyWorst *candidate)
+static bool is_within(const AccuracyVariant *variant, double budget, AccuracyMeasure measure)
 {
-    AccuracyWorst *worst = &comparison->errors->worst[type];
-    if (worst->found && (worst->away > candidate->away ||
-                         (worst->away == candidate->away && !(candidate->error > worst->error))))
-        return;
-    *worst = *candidate;
-    worst->found = true;
-    worst->x = (uint32_t)(pixel % comparison->reference->width);
-    worst->y = (uint32_t)(pixel / comparison->reference->width);
-    memcpy(worst->reference_color, comparison->reference->color + 3 * pixel, sizeof worst->reference_color);
-    memcpy(worst->variant_color, comparison->variant->color + 3 * pixel, sizeof worst->variant_color);
+    if (!competes(variant)) return false;
+    if (variant->status == ACCURACY_REFERENCE) return true;
+    const Figure error = accuracy_figure(variant, measure);
+    return !error.why_not && error.value <= budget;
 }
 
-static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel, bool edge,
-                        const uint32_t values[2], uint32_t light)
+// Finds the recommendation for a budget. The intervals of all pairs of the scene's variants hold together, so
+// they hold whichever variant is picked by its times.
+static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
+                                                  AccuracyMeasure measure)
 {
-    AccuracyErrors *errors = comparison->errors;
-    EdgeCount *count = type == ACCURACY_OBJECT   ? &errors->object
-                       : type == ACCURACY_SHADOW ? &errors->shadow
-                                                 : &errors->path;
-    count->edge += edge;
-    count->away += !edge;
-    worst_record(comparison, type, pixel,
-                 &(AccuracyWorst){.away = !edge,
-                                  .light = light,
-                                  .error = color_worst(comparison, pixel).error,
-                                  .reference = values[0],
-                                  .variant = values[1]});
-}
-
-// Returns whether every light's bit equals the reference's. Where two surfaces touch, a rounding decides
-// whether a point of the one lies in the other's shadow, so silhouettes are edges of every shadow.
-static bool shadows_compare(const FilmComparison *comparison, size_t pixel)
-{
-    const uint32_t lights = comparison->reference->light_count;
-    bool equal = true;
-    for (uint32_t light = 0; light < lights; light++) {
-        const size_t bit = pixel * lights + light;
-        const uint32_t values[2] = {comparison->reference->shadow[bit], comparison->variant->shadow[bit]};
-        if (values[0] == values[1]) continue;
-        equal = false;
-        count_wrong(comparison, ACCURACY_SHADOW, pixel,
-                    comparison->edges->shadow[bit] || comparison->edges->silhouette[pixel], values, light);
+    const size_t count = scene->variant_count, pair_count = count > 1 ? count * (count - 1) / 2 : 1;
+    AccuracyRecommendation pick = {budget, measure, SIZE_MAX, NULL};
+    for (size_t i = 0; i < count; i++) {
+        if (!is_within(&scene->variants[i], budget, measure)) continue;
+        if (pick.variant == SIZE_MAX ||
+            scene->variants[i].frame_seconds < scene->variants[pick.variant].frame_seconds)
+            pick.variant = i;
     }
-    return equal;
+    pick.times = memory_allocate_zeroed(count, sizeof *pick.times);
+    for (size_t i = 0; i < count && pick.variant != SIZE_MAX; i++)
+        if (i != pick.variant && is_within(&scene->variants[i], budget, measure))
+            pick.times[i] =
+                comparison_of_rounds(&scene->variants[i].row->times.frame,
+                                     &scene->variants[pick.variant].row->times.frame, pair_count, 1);
+    return pick;
 }
 
-static bool path_compare(const FilmComparison *comparison, size_t pixel)
+bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant)
 {
-    const uint32_t values[2] = {comparison->reference->path[pixel], comparison->variant->path[pixel]};
-    if (values[0] == values[1]) return true;
-    count_wrong(comparison, ACCURACY_PATH, pixel, comparison->edges->path[pixel], values, 0);
-    return false;
+    return pick->times[variant].ratio > 0 && pick->times[variant].verdict != VERDICT_SLOWER;
 }
 
-// Returns the angle between two vectors of about unit length, accurately even if it is small or near pi.
-static double vector_angle(Vector3 a, Vector3 b)
+void accuracy_classify(AccuracyScene *scene, const AccuracyBudgets *budgets)
 {
-    double angle = atan2(vector_length(vector_cross(a, b)), vector_dot(a, b));
-    return isfinite(angle) ? angle : INFINITY;
-}
-
-static void surface_compare(const FilmComparison *comparison, size_t pixel)
-{
-    AccuracyErrors *errors = comparison->errors;
-    const size_t place = errors->surface_pixels++;
-    const double expected = comparison->reference->t[pixel], found = comparison->variant->t[pixel];
-    const double difference = value_error(expected, found), relative = difference / fabs(expected);
-    const int significant_bits = comparison->variant->is_double ? DBL_MANT_DIG : FLT_MANT_DIG;
-    const double ulps = difference / ulp_of(expected, significant_bits);
-    const double angle = vector_angle(vector_from(comparison->reference->normal + 3 * pixel),
-                                      vector_from(comparison->variant->normal + 3 * pixel));
-    comparison->t_relative[place] = (float)relative;
-    comparison->t_ulps[place] = (float)ulps;
-    comparison->normal[place] = (float)angle;
-    errors->t_relative.largest = fmax(errors->t_relative.largest, relative);
-    errors->t_ulps.largest = fmax(errors->t_ulps.largest, ulps);
-    errors->normal.largest = fmax(errors->normal.largest, angle);
-    if (relative > 0)
-        worst_record(comparison, ACCURACY_T, pixel,
-                     &(AccuracyWorst){.error = relative, .reference = expected, .variant = found});
-    if (angle > 0) worst_record(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
-}
-
-static void color_error_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
-{
-    const AccuracyWorst candidate = color_worst(comparison, pixel);
-    if (candidate.error > 0) worst_record(comparison, type, pixel, &candidate);
-}
-
-static void pixel_compare(const FilmComparison *comparison, size_t pixel)
-{
-    AccuracyErrors *errors = comparison->errors;
-    color_error_record(comparison, ACCURACY_IMAGE, pixel);
-    if (errors->why_colors_only) return;
-    const uint32_t objects[2] = {comparison->reference->object[pixel], comparison->variant->object[pixel]};
-    if (objects[0] != objects[1]) {
-        count_wrong(comparison, ACCURACY_OBJECT, pixel, comparison->edges->silhouette[pixel], objects, 0);
-        return;
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        AccuracyVariant *variant = &scene->variants[i];
+        variant->frame_seconds = series_summarize(&variant->row->times.frame).median;
+        variant->disqualified =
+            variant->status == ACCURACY_MEASURED ? accuracy_disqualifications(&variant->errors) : 0;
     }
-    bool same_shadows = shadows_compare(comparison, pixel), same_path = path_compare(comparison, pixel);
-    if (objects[0] == UINT32_MAX) return;
-    surface_compare(comparison, pixel);
-    if (!same_shadows || !same_path) return;
-    const size_t place = 3 * errors->shading_pixels++;
-    memcpy(comparison->expected + place, comparison->reference->color + 3 * pixel, 3 * sizeof(double));
-    memcpy(comparison->found + place, comparison->variant->color + 3 * pixel, 3 * sizeof(double));
-    color_error_record(comparison, ACCURACY_SHADING, pixel);
-}
-
-static ImageMetrics display_compare(const Film *reference, const Film *variant, bool display_values)
-{
-    const Film *const films[] = {reference, variant};
-    Image images[2];
-    for (size_t i = 0; i < 2; i++)
-        images[i] = (Image){.width = films[i]->width,
-                            .height = films[i]->height,
-                            .channels = 3,
-                            .values = film_narrow_color(films[i]),
-                            .display = display_values};
-    ImageMetrics metrics = image_metrics(&images[0], &images[1]);
-    image_free(&images[0]);
-    image_free(&images[1]);
-    return metrics;
-}
-
-void accuracy_compare(AccuracyErrors *errors, const Film *reference, const AccuracyEdges *edges,
-                      const Film *variant, bool display_values)
-{
-    *errors = (AccuracyErrors){0};
-    if (!reference->object) errors->why_colors_only = "the reference has colors only";
-    accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
-    const size_t pixels = film_pixel_count(reference);
-    FilmComparison comparison = {
-        .reference = reference,
-        .variant = variant,
-        .edges = edges,
-        .errors = errors,
-        .expected = memory_allocate(pixels, 3 * sizeof(double)),
-        .found = memory_allocate(pixels, 3 * sizeof(double)),
-        .t_relative = memory_allocate(pixels, sizeof(float)),
-        .t_ulps = memory_allocate(pixels, sizeof(float)),
-        .normal = memory_allocate(pixels, sizeof(float)),
-    };
-    for (size_t pixel = 0; pixel < pixels; pixel++)
-        pixel_compare(&comparison, pixel);
-    errors->shading = error_summarize(comparison.expected, comparison.found, 3 * errors->shading_pixels);
-    errors->t_relative.percentile_999 = percentile_999(comparison.t_relative, errors->surface_pixels);
-    errors->t_ulps.percentile_999 = percentile_999(comparison.t_ulps, errors->surface_pixels);
-    errors->normal.percentile_999 = percentile_999(comparison.normal, errors->surface_pixels);
-    errors->image = error_summarize(reference->color, variant->color, 3 * pixels);
-    errors->display = display_compare(reference, variant, display_values);
-    free(comparison.expected);
-    free(comparison.found);
-    free(comparison.t_relative);
-    free(comparison.t_ulps);
-    free(comparison.normal);
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        AccuracyVariant *variant = &scene->variants[i];
+        variant->pareto = 0;
+        for (unsigned type = 0; type < ACCURACY_MEASURE_COUNT; type++)
+            if (is_pareto_optimal(scene, variant, (AccuracyMeasure)type)) variant->pareto |= 1u << type;
+    }
+    for (size_t i = 0; i < scene->recommendation_count; i++)
+        free(scene->recommendations[i].times);
+    AccuracyMeasure measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
+    scene->recommendation_count = budgets->count;
+    for (size_t i = 0; i < budgets->count; i++)
+        scene->recommendations[i] = recommendation_find(scene, budgets->limits[i], measure);
 }
