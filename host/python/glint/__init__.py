@@ -397,7 +397,7 @@ def load(path: Union[str, os.PathLike[str]], *, overrides: Optional[Mapping[str,
     """
     options = _options(overrides, frame, max_pixels, None if camera is None else os.fsencode(camera))
     scene = Scene.__new__(Scene)
-    scene._adopt(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
+    scene._adopt(lambda handle, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), handle, messages))
     return scene
 
 
@@ -419,5 +419,5 @@ def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
     mesh = _c.Mesh(ctypes.sizeof(_c.Mesh), 0 if points.dtype == np.float32 else 1, _h.pointer(points), _h.pointer(directions), len(points),
                    _h.pointer(triangles), len(triangles))
     scene = Scene.__new__(Scene)
-    scene._adopt(lambda taken, messages: _c.library.glint_scene_of_mesh(ctypes.byref(mesh), taken, messages))
+    scene._adopt(lambda handle, messages: _c.library.glint_scene_of_mesh(ctypes.byref(mesh), handle, messages))
     return scene
