@@ -12,15 +12,9 @@ typedef struct {
     Color3 density, outer;
 } Medium;
 
-// A ray to trace, and the weight of its color in the pixel. A weight of 0 means that there is no ray.
+// What a Bounce needs at `certified`.
 typedef struct {
-    Vector origin, direction; // unit
-    Color3 weight;
-    uint depth;
-    real travelled; // distance from the eye along the path
-    Sample sample;  // with HAS_AREA_LIGHTS
-    Medium medium;  // with HAS_ABSORPTION
-    // At `certified`, copied to the Ray's fields of the same names; start_error becomes -tmin:
+    // copied to the Ray's fields of the same names; start_error becomes -tmin
     real origin_error, start_error, direction_error;
     integer origin_object;
     mask leaves_outward;
@@ -28,6 +22,17 @@ typedef struct {
     // with HAS_DECISIONS, the ray's number in its tree and the lanes in which its node is recorded
     uint number;
     mask known;
+} CertainBounce;
+
+// A ray to trace, and the weight of its color in the pixel. A weight of 0 means that there is no ray.
+typedef struct {
+    Vector origin, direction; // unit
+    Color3 weight;
+    uint depth;
+    real travelled;        // distance from the eye along the path
+    Sample sample;         // with HAS_AREA_LIGHTS
+    Medium medium;         // with HAS_ABSORPTION
+    CertainBounce certain; // at `certified`
 } Bounce;
 
 static inline mask bounce_is_active(const Bounce *bounce)
@@ -41,14 +46,14 @@ static inline Ray bounce_ray(const Bounce *bounce)
     if (HAS_IMAGES) ray.travelled = bounce->travelled;
     if (HAS_AREA_LIGHTS) ray.sample = bounce->sample;
     if (IS_CERTIFIED) {
-        ray.origin_error = bounce->origin_error;
-        ray.tmin = -bounce->start_error;
-        ray.direction_error = bounce->direction_error;
-        ray.origin_object = bounce->origin_object;
-        ray.leaves_outward = bounce->leaves_outward;
+        ray.origin_error = bounce->certain.origin_error;
+        ray.tmin = -bounce->certain.start_error;
+        ray.direction_error = bounce->certain.direction_error;
+        ray.origin_object = bounce->certain.origin_object;
+        ray.leaves_outward = bounce->certain.leaves_outward;
         if (HAS_CHORDS) {
-            ray.chord_turn = bounce->chord_turn;
-            ray.chord_end_position = bounce->chord_end_position;
+            ray.chord_turn = bounce->certain.chord_turn;
+            ray.chord_end_position = bounce->certain.chord_end_position;
         }
     }
     return ray;

@@ -16,10 +16,10 @@
 
 static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask inside)
 {
-    bounce->chord_turn = lanes_select(inside, chord->turn, NEVER);
-    bounce->chord_end_position = lanes_select(inside, chord->end_position, NEVER);
-    real error = real_min(bounce->direction_error, chord->direction_error);
-    real_replace(&bounce->direction_error, inside, error);
+    bounce->certain.chord_turn = lanes_select(inside, chord->turn, NEVER);
+    bounce->certain.chord_end_position = lanes_select(inside, chord->end_position, NEVER);
+    real error = real_min(bounce->certain.direction_error, chord->direction_error);
+    real_replace(&bounce->certain.direction_error, inside, error);
 }
 
 // The incidence of a ray on a surface.
@@ -44,7 +44,7 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
 {
     const real normal_error = surface->normal_error;
     real error = real_fma((real)(2), normal_error, incidence->turn);
-    reflected->direction_error = error;
+    reflected->certain.direction_error = error;
     if (HAS_CHORDS) {
         const ChordEnd *end = &surface->chord_end;
         Chord chord = chord_start(end, surface->position_error, incidence->cosine,
@@ -53,7 +53,7 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
         bounce_set_chord(reflected, &chord, !surface->entering);
     }
     mask reflects = incidence->found & bounce_is_active(reflected);
-    mask uncertain = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
+    mask uncertain = reflects & !(reflected->certain.direction_error <= BOUNCE_ERROR_MAX);
     if (!HAS_TRIANGLES) return uncertain;
     // the shading normal's reflection may run through the surface
     Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
@@ -104,8 +104,8 @@ static inline void refracted_set_chord(const Surface *surface, const Snell *snel
     real steepest = real_max(real_divide(snell->s + snell->s_error, snell->least_root), snell->scale);
     real turned = real_fma(steepest, end->turn + end->normal, end->normal);
     real leaving = computed + (divide_or(end->position, end->radius, NEVER) + turned);
-    refracted->direction_error = lanes_select(surface->entering, refracted->direction_error,
-                                              real_min(leaving, refracted->direction_error));
+    refracted->certain.direction_error = lanes_select(surface->entering, refracted->certain.direction_error,
+                                                      real_min(leaving, refracted->certain.direction_error));
 }
 
 // Sets the error of a refracted ray. n d + N (s - sqrt(s^2 - k)) is off by the errors of d and N and by the
@@ -129,13 +129,13 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     real computed = real_fma(BOUNCE_ROUNDING * roundings, inverse_length, BOUNCE_ROUNDING);
     real error =
         snell.scale * incidence->turn + fabs(snell.s - snell.root) * normal_error + change * snell.s_error;
-    refracted->direction_error = real_fma(error, inverse_length, computed);
+    refracted->certain.direction_error = real_fma(error, inverse_length, computed);
     if (HAS_CHORDS) refracted_set_chord(surface, &snell, angle_error, computed, refracted);
     mask uncertain = transparent & snell.uncertain;
-    uncertain = uncertain | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
+    uncertain = uncertain | (refracts & !(refracted->certain.direction_error <= BOUNCE_ERROR_MAX));
     if (!HAS_TRIANGLES) return uncertain;
     real inward = fabs(vector_dot(refracted->direction, surface->normal));
-    return uncertain | (refracts & (inward <= refracted->direction_error + normal_error));
+    return uncertain | (refracts & (inward <= refracted->certain.direction_error + normal_error));
 }
 
 // Sets the bounds of a surface's bounces. Uncertain lanes are not traced further.
@@ -145,14 +145,14 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, Bo
     Bounce *reflected = &bounces->reflected, *refracted = &bounces->refracted;
     const Color3 none = color_gray((real)(0));
     const Incidence incidence = surface_incidence(surface, ray);
-    reflected->origin_error = surface->line_error;
-    reflected->start_error = surface->start_error;
-    refracted->origin_error = surface->position_error;
-    refracted->start_error = (real)(0);
-    reflected->origin_object = refracted->origin_object = surface->object;
-    reflected->leaves_outward = surface->entering;
-    refracted->leaves_outward = !surface->entering;
-    refracted->direction_error = (real)(0);
+    reflected->certain.origin_error = surface->line_error;
+    reflected->certain.start_error = surface->start_error;
+    refracted->certain.origin_error = surface->position_error;
+    refracted->certain.start_error = (real)(0);
+    reflected->certain.origin_object = refracted->certain.origin_object = surface->object;
+    reflected->certain.leaves_outward = surface->entering;
+    refracted->certain.leaves_outward = !surface->entering;
+    refracted->certain.direction_error = (real)(0);
     *uncertain = *uncertain | reflected_set_error(surface, ray, &incidence, reflected);
     if (HAS_TRANSMISSION)
         *uncertain = *uncertain | refracted_set_error(surface, &incidence, bounces->total, refracted);

@@ -65,17 +65,17 @@ static inline global uint *node_record(const TreeNode *node)
 static inline void bounces_set_nodes(Bounces *bounces, const TreeNode *node)
 {
     const uint parent = min(node->number, (uint)RECORDED_NODES);
-    bounces->reflected.number = HAS_TRANSMISSION ? 2 * parent + 1 : parent + 1;
-    bounces->refracted.number = 2 * parent + 2;
-    bounces->reflected.known = node->known & ((node->events & HAS_REFLECTED_NODE) != (integer)(0));
-    bounces->refracted.known = node->known & ((node->events & HAS_REFRACTED_NODE) != (integer)(0));
+    bounces->reflected.certain.number = HAS_TRANSMISSION ? 2 * parent + 1 : parent + 1;
+    bounces->refracted.certain.number = 2 * parent + 2;
+    bounces->reflected.certain.known = node->known & ((node->events & HAS_REFLECTED_NODE) != (integer)(0));
+    bounces->refracted.certain.known = node->known & ((node->events & HAS_REFRACTED_NODE) != (integer)(0));
 }
 
 // Moves on to a bounce's node.
 static inline void node_set_bounce(TreeNode *node, const Bounce *bounce)
 {
-    node->number = bounce->number;
-    node->known = bounce->known;
+    node->number = bounce->certain.number;
+    node->known = bounce->certain.known;
 }
 
 // Sets the hit of a packet's rays. `uncertain` marks the lanes where it is not proven.
@@ -116,9 +116,9 @@ static inline void node_store(TreeNode *node, const Bounces *bounces)
     global uint *record = node_record(node);
     if (!record) return;
     const integer none = (integer)(0);
-    if (bounces->reflected.number < RECORDED_NODES)
+    if (bounces->reflected.certain.number < RECORDED_NODES)
         node->events |= lanes_select(bounce_is_active(&bounces->reflected), HAS_REFLECTED_NODE, none);
-    if (HAS_TRANSMISSION && bounces->refracted.number < RECORDED_NODES)
+    if (HAS_TRANSMISSION && bounces->refracted.certain.number < RECORDED_NODES)
         node->events |= lanes_select(bounce_is_active(&bounces->refracted), HAS_REFRACTED_NODE, none);
     const IntegerLanes slot = {node->slot};
     record += (uint)slot.each[0];

@@ -152,6 +152,14 @@ static inline void hit_set_bounces(const Scene *scene, const Ray *ray, const Sur
     }
 }
 
+// A refracted ray that waits while the reflected one is traced. A GPU may reserve memory for PENDING_MAX of
+// them in each thread, so this has only what every kernel needs of a Bounce.
+typedef struct {
+    Vector origin, direction;
+    Color3 weight;
+    uint depth;
+} PendingRay;
+
 // Traces a ray tree depth first, reflected before refracted, and returns its color. *node and *shaded,
 // elements of arrays, hold the current ray's node and hit; *node is the root's at first. With `is_shaded` it
 // holds the camera ray's at first, which rays_shade has traced with other packets. If COMPUTE_SIGNATURE, sets
@@ -167,8 +175,14 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     real color_error = (real)(0);
     Bounce traced = {ray.origin, ray.direction, color_gray((real)(1)), 0};
     if (HAS_ABSORPTION) traced.medium = (Medium){black, black};
-    Ray rays[1] = {ray};         // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
-    Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
+    Ray rays[1] = {ray}; // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
+    // Refracted rays, while the reflected ones are traced; one per depth. Compilers drop arrays that a kernel
+    // does not read.
+    PendingRay pending[PENDING_MAX];
+    real travelled[PENDING_MAX];
+    Sample samples[PENDING_MAX];
+    Medium media[PENDING_MAX];
+    CertainBounce certain[PENDING_MAX];
     uint pending_count = 0;
     for (;;) {
         if (traced.depth > 0 || !is_shaded) rays_shade(scene, rays, 1, node, shaded);
@@ -203,13 +217,26 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         ray_counter_add(scene, RAYS_REFLECTED, reflects);
         ray_counter_add(scene, RAYS_REFRACTED, refracts);
         if (lanes_any(reflects)) {
-            if (HAS_TRANSMISSION && lanes_any(refracts)) pending[pending_count++] = bounces.refracted;
+            if (HAS_TRANSMISSION && lanes_any(refracts)) {
+                const Bounce *refracted = &bounces.refracted;
+                pending[pending_count] = (PendingRay){refracted->origin, refracted->direction,
+                                                      refracted->weight, refracted->depth};
+                travelled[pending_count] = refracted->travelled;
+                samples[pending_count] = refracted->sample;
+                media[pending_count] = refracted->medium;
+                certain[pending_count++] = refracted->certain;
+            }
             traced = bounces.reflected;
         } else if (lanes_any(refracts)) {
             traced = bounces.refracted;
         } else {
             if (pending_count == 0) break;
-            traced = pending[--pending_count];
+            const PendingRay last = pending[--pending_count];
+            traced = (Bounce){last.origin, last.direction, last.weight, last.depth};
+            if (HAS_IMAGES) traced.travelled = travelled[pending_count];
+            if (HAS_AREA_LIGHTS) traced.sample = samples[pending_count];
+            if (HAS_ABSORPTION) traced.medium = media[pending_count];
+            if (IS_CERTIFIED) traced.certain = certain[pending_count];
         }
         rays[0] = bounce_ray(&traced);
         if (HAS_DECISIONS) node_set_bounce(node, &traced);
