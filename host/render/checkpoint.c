@@ -2,8 +2,22 @@
 // Numbers are in native byte order, so a checkpoint can be resumed only on a machine with the byte order of
 // the one that wrote it.
 //
-// `bands` and `offsets` list the whole records, and `end` is where the last of them ends. After a `failure`
-// nothing is appended, because a reader stops at a torn record.
+// The states of the file:
+//
+//     LOCKED ──head fits───▶ CHECKED ──records found──▶ OPEN ──complete───────▶ removed
+//       └─refused─▶ unchanged  └─unreadable─▶ unchanged  ├─────ended early────▶ kept
+//                                                        └─▶ FAILED ──────────▶ kept
+//
+// These invariants hold in OPEN and FAILED whenever the mutex is free:
+//
+//  1. This process has the lock on the file, from file_open to checkpoint_close.
+//  2. Below `end` there are only the head, the key and whole records. What follows, after a failed write, is
+//     cut off by the next process that opens the file.
+//  3. `bands` and `offsets` have an element for each record, in the order of the file. No row is in two
+//     bands.
+//  4. `failure` is set once and never cleared. While it is set, nothing is appended.
+//  5. The first append that is `sync_seconds` later than the last sync syncs all records, and so does
+//     checkpoint_close if it keeps the file.
 #include "host/render/checkpoint.h"
 
 #include "host/base/array.h"

@@ -3,6 +3,15 @@
 // unknown gets one step, since it may be a thousand times slower than the others. A worker that would end
 // after another could have rendered all remaining rows gets nothing more.
 //
+// The states of a row, with the functions that change them:
+//
+//     FREE ──scheduler_acquire──▶ ACQUIRED ──scheduler_deliver──▶ FORWARDED ──sink accepts──▶ DELIVERED
+//      ▲                            ├────────earlier rows missing─▶ WAITING ──next──▶ FORWARDED
+//      └────────scheduler_drop──────┘
+//
+// The bands of a checkpoint start in WAITING. If the sink rejects a band or the checkpoint fails, all rows
+// stay where they are.
+//
 // These invariants hold whenever the mutex is free:
 //
 //  1. The first `delivered_rows` rows have reached the sink. Until `has_ended`, each of the others is in
