@@ -134,8 +134,8 @@ $(BUILD)/all_shapes.h: $(shapes) kernels/shapes
 # TEXTBOOK=1 replaces the shapes' formulas by those of tools/numerics/textbook.h.
 $(BUILD)/primitives.h: kernels/traversal/primitives.h tools/numerics/textbook.h
 	@mkdir -p $(@D)
-	sed -e '/^#include "traversal\/cutout.h"/r tools/numerics/textbook.h' -e 's/\bname##_hit(/textbook_##name##_hit(/' $< > $@
-	grep -q '^static inline mask textbook_sphere_hit' $@ && grep -q 'textbook_##name##_hit(' $@
+	sed '/^#include "traversal\/cutout.h"/r tools/numerics/textbook.h' $< > $@
+	grep -q '^static inline mask textbook_sphere_hit' $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)

@@ -94,13 +94,11 @@ static bool shape_transform(Object *object, const Affine *affine)
     for (Vector3 *const *point = members.points; *point; point++)
         **point = affine_point(affine, **point);
     box_order(object);
-    Vector3 *direction = members.directions[0];
-    if (object->type == SHAPE_PLANE || object->type == SHAPE_DISC) {
-        const Affine for_normals = affine_for_normals(affine);
-        *direction = affine_normal(&for_normals, *direction);
-    } else if (direction) {
-        *direction = affine_direction(affine, *direction);
-    }
+    const bool is_normal = object->type == SHAPE_PLANE || object->type == SHAPE_DISC;
+    const Affine for_normals = affine_for_normals(affine);
+    for (Vector3 *const *direction = members.directions; *direction; direction++)
+        **direction =
+            is_normal ? affine_normal(&for_normals, **direction) : affine_direction(affine, **direction);
     const double along = vector_length(scale.along);
     double factors[] = {scale.across, scale.across};
     if (object->type == SHAPE_CONE) object->as.cone.slope *= scale.across / along;
@@ -152,7 +150,8 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
         oval_transform(object, affine);
     }
     if (!shape_fits(object)) return out_of_range;
-    return object->type != SHAPE_OVAL || oval_is_moderate(object)
+    const ShapeMembers members = shape_members(object);
+    return object->type == SHAPE_TRIANGLE || !members.directions[2] || axes_are_moderate(*members.directions)
                ? NULL
                : "gets thinner than a millionth of its length, or leans by more than 89.9 degrees";
 }

@@ -120,22 +120,26 @@ void oval_transform(Object *object, const Affine *affine)
     if (object->as.oval.unit != SHAPE_TORUS) axis_rescale(object);
 }
 
-void oval_stretches(const Object *oval, double *least, double *most)
+static void axes_stretches(const Vector3 axes[3], double *least, double *most)
 {
-    Vector3 axes[3] = {oval->as.oval.axes[0], oval->as.oval.axes[1], oval->as.oval.axes[2]};
-    axes_turn_all(axes);
+    Vector3 turned[3] = {axes[0], axes[1], axes[2]};
+    axes_turn_all(turned);
     *least = INFINITY, *most = 0;
     for (int i = 0; i < 3; i++) {
-        *least = fmin(*least, vector_length(axes[i]));
-        *most = fmax(*most, vector_length(axes[i]));
+        *least = fmin(*least, vector_length(turned[i]));
+        *most = fmax(*most, vector_length(turned[i]));
     }
 }
 
-bool oval_is_moderate(const Object *object)
+void oval_stretches(const Object *oval, double *least, double *most)
 {
-    const Vector3 *axes = object->as.oval.axes;
+    axes_stretches(oval->as.oval.axes, least, most);
+}
+
+bool axes_are_moderate(const Vector3 axes[3])
+{
     double least, most;
-    oval_stretches(object, &least, &most);
+    axes_stretches(axes, &least, &most);
     const Vector3 across = vector_cross(vector_normalize(axes[0]), vector_normalize(axes[1]));
     return least >= 1e-6 * most &&
            fabs(vector_dot(across, vector_normalize(axes[2]))) >= 0.00175; // the sine of 0.1 degrees

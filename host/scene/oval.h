@@ -10,8 +10,9 @@ void oval_make(Object *object);
 // Transforms an oval. Among the maps that give the same points it chooses one that stretches little.
 void oval_transform(Object *object, const Affine *affine);
 
-// Returns whether the axes' lengths and directions are moderate enough for a mapped ray to stay accurate.
-bool oval_is_moderate(const Object *object);
+// Returns whether axes have lengths and directions that are moderate enough for a mapped ray to stay
+// accurate.
+bool axes_are_moderate(const Vector3 axes[3]);
 
 // Returns the unit shape, which lies around the z axis with its middle or apex at 0 and has the radius 1
 // where it is widest.

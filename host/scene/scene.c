@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SHAPE_NAME(NAME, name) name,
+#define SHAPE_NAME(NAME, name, ...) name,
 const char *const shape_names[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_NAME) "oval", "mesh"};
 #undef SHAPE_NAME
 

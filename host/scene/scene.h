@@ -176,19 +176,22 @@ typedef struct {
 } SceneTexture;
 
 // Every shape of scene files by its name there, in the order of the kernels' SHAPE_LIST (kernels/types.h).
-// After them come the oval, which transforms make of shapes, and the mesh.
-#define SCENE_SHAPE_LIST(SHAPE)                                                                              \
-    SHAPE(SPHERE, "sphere")                                                                                  \
-    SHAPE(PLANE, "plane")                                                                                    \
-    SHAPE(DISC, "disc")                                                                                      \
-    SHAPE(BOX, "box")                                                                                        \
-    SHAPE(CYLINDER, "cylinder")                                                                              \
-    SHAPE(CONE, "cone")                                                                                      \
-    SHAPE(TRIANGLE, "triangle")                                                                              \
-    SHAPE(TORUS, "torus")                                                                                    \
-    SHAPE(PARABOLOID, "paraboloid")
+// After them come the oval, which transforms make of shapes, and the mesh. Each shape's member of Object.as
+// begins with as many positions, directions and lengths as its row counts, in this order.
+// clang-format off
+#define SCENE_SHAPE_LIST(SHAPE)              \
+    SHAPE(SPHERE,     "sphere",     1, 0, 1) \
+    SHAPE(PLANE,      "plane",      1, 1, 0) \
+    SHAPE(DISC,       "disc",       1, 1, 1) \
+    SHAPE(BOX,        "box",        2, 0, 0) \
+    SHAPE(CYLINDER,   "cylinder",   1, 1, 1) \
+    SHAPE(CONE,       "cone",       1, 1, 2) \
+    SHAPE(TRIANGLE,   "triangle",   3, 3, 0) \
+    SHAPE(TORUS,      "torus",      1, 1, 2) \
+    SHAPE(PARABOLOID, "paraboloid", 1, 1, 2)
+// clang-format on
 
-#define SHAPE_ENUMERATOR(NAME, name) SHAPE_##NAME,
+#define SHAPE_ENUMERATOR(NAME, ...) SHAPE_##NAME,
 typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_OVAL, SHAPE_MESH, SHAPE_COUNT } ShapeType;
 #undef SHAPE_ENUMERATOR
 

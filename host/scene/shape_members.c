@@ -1,42 +1,22 @@
 #include "host/scene/shape_members.h"
 
-#define MEMBER(name) &object->as.name
+#define SHAPE_COUNTS(NAME, name, points, directions, lengths) [SHAPE_##NAME] = {points, directions, lengths},
+static const struct {
+    unsigned points, directions, lengths;
+} member_counts[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_COUNTS)[SHAPE_OVAL] = {1, 3, 0}};
 
 ShapeMembers shape_members(Object *object)
 {
-    switch (object->type) {
-    case SHAPE_SPHERE:
-        return (ShapeMembers){{MEMBER(sphere.center)}, {NULL}, {MEMBER(sphere.radius)}};
-    case SHAPE_PLANE:
-        return (ShapeMembers){{MEMBER(plane.point)}, {MEMBER(plane.normal)}, {NULL}};
-    case SHAPE_DISC:
-        return (ShapeMembers){{MEMBER(disc.center)}, {MEMBER(disc.normal)}, {MEMBER(disc.radius)}};
-    case SHAPE_BOX:
-        return (ShapeMembers){{MEMBER(box.min), MEMBER(box.max)}, {NULL}, {NULL}};
-    case SHAPE_CYLINDER:
-        return (ShapeMembers){{MEMBER(cylinder.from)}, {MEMBER(cylinder.axis)}, {MEMBER(cylinder.radius)}};
-    case SHAPE_CONE:
-        return (ShapeMembers){
-            {MEMBER(cone.from)}, {MEMBER(cone.axis)}, {MEMBER(cone.radius[0]), MEMBER(cone.radius[1])}};
-    case SHAPE_TRIANGLE: {
-        Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
-        return (ShapeMembers){
-            {vertices, vertices + 1, vertices + 2}, {normals, normals + 1, normals + 2}, {NULL}};
-    }
-    case SHAPE_TORUS:
-        return (ShapeMembers){
-            {MEMBER(torus.center)}, {MEMBER(torus.axis)}, {MEMBER(torus.major), MEMBER(torus.minor)}};
-    case SHAPE_PARABOLOID:
-        return (ShapeMembers){{MEMBER(paraboloid.apex)},
-                              {MEMBER(paraboloid.axis)},
-                              {MEMBER(paraboloid.focal_length), MEMBER(paraboloid.height)}};
-    case SHAPE_OVAL:
-        return (ShapeMembers){{MEMBER(oval.center)},
-                              {MEMBER(oval.axes[0]), MEMBER(oval.axes[1]), MEMBER(oval.axes[2])},
-                              {NULL}};
-    default:
-        return (ShapeMembers){{NULL}, {NULL}, {NULL}};
-    }
+    ShapeMembers members = {0};
+    Vector3 *vector = (Vector3 *)(void *)&object->as;
+    for (unsigned i = 0; i < member_counts[object->type].points; i++)
+        members.points[i] = vector++;
+    for (unsigned i = 0; i < member_counts[object->type].directions; i++)
+        members.directions[i] = vector++;
+    double *length = (double *)(void *)vector;
+    for (unsigned i = 0; i < member_counts[object->type].lengths; i++)
+        members.lengths[i] = length++;
+    return members;
 }
 
 void box_order(Object *object)

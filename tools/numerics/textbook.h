@@ -1,6 +1,5 @@
 // Intersects rays with shapes by textbook formulas, to compare with glint's. The formulas are never
-// shipped. make TEXTBOOK=1 includes them in kernels/traversal/primitives.h, which then calls
-// textbook_SHAPE_hit.
+// shipped. make TEXTBOOK=1 includes them in kernels/traversal/primitives.h, which then calls them.
 
 // The roots of a t^2 + 2 b t + c = 0 by the quadratic formula.
 typedef struct {
@@ -247,6 +246,12 @@ static inline mask textbook_triangle_hit(const Triangle *triangle, const Ray *ra
     return hit & (u >= (real)(0)) & (v >= (real)(0)) & (u + v <= (real)(1)) & (*t > ray->tmin);
 }
 
-// The paraboloid and the oval have no textbook formula, so glint's are used.
-#define textbook_paraboloid_hit paraboloid_hit
-#define textbook_oval_hit       oval_hit
+// Shapes without a textbook formula keep glint's.
+#define sphere_hit   textbook_sphere_hit
+#define plane_hit    textbook_plane_hit
+#define disc_hit     textbook_disc_hit
+#define box_hit      textbook_box_hit
+#define cylinder_hit textbook_cylinder_hit
+#define cone_hit     textbook_cone_hit
+#define torus_hit    textbook_torus_hit
+#define triangle_hit textbook_triangle_hit

@@ -217,7 +217,7 @@ static void shape_read(YamlReader *reader, ShapeType type, const YamlNode *mappi
     yaml_transform_objects(reader, reader->scene->objects.count - 1, &placed.transform, mapping);
 }
 
-#define SHAPE_WORD(NAME, name) name,
+#define SHAPE_WORD(NAME, name, ...) name,
 
 static void object_read(YamlReader *reader, const YamlNode *item)
 {
