@@ -133,6 +133,15 @@ typedef struct {
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | HAS_POWER
 } Paraboloid;
 
+// A superellipsoid: the points p, measured from the center, whose products with the rows have powers of an
+// even exponent that add up to 1.
+typedef struct {
+    scalar4 center;  // w: the radius of a sphere around it
+    scalar4 rows[3]; // w: a bound on the row's length
+    scalar4 extent;  // half of its box; w: the rounding scale of its points
+    uint4 id;        // y: the exponent
+} Superellipsoid;
+
 // A sphere, disc, cylinder, cone, torus or paraboloid under an affine map, such as an ellipsoid. The map
 // leads from the space of a unit shape, centered at 0 on the z axis, to that of the eye.
 typedef struct {
@@ -150,17 +159,18 @@ typedef struct {
 
 // Every shape: feature, struct, name, name of its array. Adding a shape begins here (docs/adding-a-shape.md).
 // clang-format off
-#define SHAPE_LIST(SHAPE)                           \
-    SHAPE(SPHERES,   Sphere,   sphere,   spheres)   \
-    SHAPE(PLANES,    Plane,    plane,    planes)    \
-    SHAPE(DISCS,     Disc,     disc,     discs)     \
-    SHAPE(BOXES,     Box,      box,      boxes)     \
-    SHAPE(CYLINDERS, Cylinder, cylinder, cylinders) \
-    SHAPE(CONES,     Cone,     cone,     cones)     \
-    SHAPE(TRIANGLES, Triangle, triangle, triangles) \
-    SHAPE(TORI,      Torus,    torus,    tori)      \
-    SHAPE(PARABOLOIDS, Paraboloid, paraboloid, paraboloids) \
-    SHAPE(OVALS,     Oval,     oval,     ovals)
+#define SHAPE_LIST(SHAPE)                                                   \
+    SHAPE(SPHERES,         Sphere,         sphere,         spheres)         \
+    SHAPE(PLANES,          Plane,          plane,          planes)          \
+    SHAPE(DISCS,           Disc,           disc,           discs)           \
+    SHAPE(BOXES,           Box,            box,            boxes)           \
+    SHAPE(CYLINDERS,       Cylinder,       cylinder,       cylinders)       \
+    SHAPE(CONES,           Cone,           cone,           cones)           \
+    SHAPE(TRIANGLES,       Triangle,       triangle,       triangles)       \
+    SHAPE(TORI,            Torus,          torus,          tori)            \
+    SHAPE(PARABOLOIDS,     Paraboloid,     paraboloid,     paraboloids)     \
+    SHAPE(SUPERELLIPSOIDS, Superellipsoid, superellipsoid, superellipsoids) \
+    SHAPE(OVALS,           Oval,           oval,           ovals)
 // clang-format on
 
 // An instance of a shared mesh, a primitive of the scene's BVH with a BVH inside. It maps the mesh's space,

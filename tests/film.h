@@ -16,9 +16,9 @@ const uint32_t *tested_lanes(const Device *device);
 // feature their build would take half as long again.
 #define CERTIFIED_FEATURES                                                                                   \
     (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_BOXES | FEATURE_CYLINDERS | FEATURE_CONES |  \
-     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS | FEATURE_OVALS |       \
-     FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
-     FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
+     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS |                       \
+     FEATURE_SUPERELLIPSOIDS | FEATURE_OVALS | FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS |           \
+     FEATURE_CHECKERS | FEATURE_REFLECTION | FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
 
 // Returns the features that tests build in beyond a scene's, so that all tests of a run share one program per
 // precision: all, CERTIFIED_FEATURES at certified, and none in long tests.

@@ -10,7 +10,7 @@ if is_long; then
     check "the textbook's ladder builds" $make -s BUILD="$build-textbook" TEXTBOOK=1 ladder
     check "the textbook's spheres miss their bounds" bash -c "! '$build-textbook/tools/numerics/ladder' --rays 250 --precision single --check --shape sphere"
 fi
-for shape in sphere plane disc box cylinder cone triangle torus paraboloid; do
+for shape in sphere plane disc box cylinder cone triangle torus paraboloid superellipsoid; do
     check "$shape" "$build/tools/numerics/ladder" --rays $rays --check --shape $shape
 done
 finish

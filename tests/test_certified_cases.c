@@ -289,13 +289,16 @@ static Object shape_of_size(unsigned form, double size)
     case 5:
         return (Object){.type = SHAPE_TORUS, .as.torus = {center, axis, size, 0.4 * size}};
     case 6:
+        return (Object){.type = SHAPE_SUPERELLIPSOID,
+                        .as.superellipsoid = {center, {{size, 0, 0}, {0, size, 0}, {0, 0, 0.6 * size}}, 6}};
+    case 7:
         return (Object){.type = SHAPE_TRIANGLE,
                         .as.triangle.vertices = {center, vector_add(center, axis), {0, 0, center.z}}};
     default:
         return (Object){.type = SHAPE_BOX, .as.box = {vector_subtract(center, vector_all(size)), center}};
     }
 }
-enum { FORMS = 8 };
+enum { FORMS = 9 };
 
 // Shapes from 1e-29 to 1e29 are seen from close by, alone and with one of another size in the same scene.
 TEST(mixed_sizes_are_decided)

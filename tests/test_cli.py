@@ -250,7 +250,7 @@ class Reports(TestCase):
 
     def test_check(self):
         scene = SCENES / "every_shape.yaml"
-        self.assertRegex(self.glint(f"check {scene}").stdout, "objects +19: 5 sphere, 1 plane, 1 disc, 1 box")
+        self.assertRegex(self.glint(f"check {scene}").stdout, "objects +20: 5 sphere, 1 plane, 1 disc, 1 box")
         report = self.json(f"check {scene} --json")
         self.assertEqual(report["schema"], 1)
         self.assertGreaterEqual(len(report["features"]), 14)

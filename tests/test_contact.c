@@ -84,6 +84,13 @@ static Trial trials[] = {
      true,
      {-1 - WIDE, -2.03125 - WIDE, -5 - WIDE},
      {1 + WIDE, -0.03125 + WIDE, -3 + WIDE}},
+    // sheared by 89 degrees, it may touch what is 2^-14 24 times its coordinates away
+    {"a sheared superellipsoid a thousandth over a floor",
+     "  - superellipsoid: {center: [0, 0, 0], radii: [0.02, 0.02, 0.02], exponent: 16, material: glass,\n"
+     "      transform: {matrix: [[1, 0, 57, 0], [0, 1, 0, -0.979], [0, 0, 1, -1]]}}\n" FLOOR,
+     true,
+     {-1.1575, -1, -1.02},
+     {1.1575, -1, -0.98}},
     {"an unbounded cylinder",
      GLASS_SPHERE "  - cylinder: {point: [0, 0, 0], axis: [1, 0, 0], radius: 1, material: chalk}\n",
      true,

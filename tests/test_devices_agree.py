@@ -19,7 +19,7 @@ from glint import IS_LONG, IS_SANITIZED, ROOT, TestCase, find_icd, has_device, m
 
 SCENE = ROOT / "tests/scenes/every_shape.yaml"
 WIDTH, HEIGHT, RAY_COUNT = (32, 18, 640) if IS_LONG else (16, 9, 160)
-RUSTICL_SHAPES = "plane disc box sphere triangle cylinder cone torus paraboloid".split() + [""] if IS_LONG else ["disc"]
+RUSTICL_SHAPES = "plane disc box sphere triangle cylinder cone torus paraboloid superellipsoid".split() + [""] if IS_LONG else ["disc"]
 POCL = {"env": {"OCL_ICD_VENDORS": find_icd("pocl")}}
 RUSTICL = {"env": {"OCL_ICD_VENDORS": find_icd("rusticl"), "RUSTICL_ENABLE": "llvmpipe"}}
 # optimized, LLVM leaves calls that Oclgrind 21.10 does not know

@@ -51,6 +51,8 @@ typedef struct {
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[TYPE_QUARTETS - 1])   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[TYPE_QUARTETS - 1]) \
+    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, Superellipsoid, rows[2]) \
+    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, Superellipsoid, extent)  \
     REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, inverses[2])                \
     REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, sizes)                      \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
@@ -140,6 +142,7 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
                                  "  - paraboloid: {apex: [0, 0, 0], axis: [0, 1, 0], focal_length: 1}\n"
                                  "  - torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, minor: 1}\n"
+                                 "  - superellipsoid: {center: [0, 0, 0], radii: [1, 2, 3], exponent: 4}\n"
                                  "  - sphere: {center: [0, 0, 0], radius: 1, transform: {scale: [1, 2, 1]}}\n"
                                  "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], normals: [[0, "
                                  "0, 1], [0, 0, 1], [0, 0, 1]]}\n"

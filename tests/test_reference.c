@@ -405,7 +405,7 @@ TEST(finds_the_nearest)
 // A ray from a distance of 1 hits a shape of size 1e-6 within 1e-31 of its surface.
 TEST(finds_small_shapes_exactly)
 {
-    enum { SHAPES = 4 };
+    enum { SHAPES = 5 };
     Random random = {1};
     size_t found[SHAPES] = {0};
     for (int i = 0; i < 1000; i++) {
@@ -418,8 +418,10 @@ TEST(finds_small_shapes_exactly)
             {.type = SHAPE_CONE,
              .as.cone = {at, vector_scale(axis, size), {0, 7 * size}, 0, true, true, false}},
             {.type = SHAPE_PARABOLOID,
-             .as.paraboloid = {
-                 .apex = at, .axis = axis, .focal_length = size, .height = size, .finite = true}}};
+             .as.paraboloid =
+                 {.apex = at, .axis = axis, .focal_length = size, .height = size, .finite = true}},
+            {.type = SHAPE_SUPERELLIPSOID,
+             .as.superellipsoid = {at, {{size, 0, 0}, {0, size, 0}, {0, 0.5 * size, size}}, 6}}};
         const Object *object = &objects[i % SHAPES];
         const Vector3 aim = vector_add(vector_add(at, half), vector_scale(random_unit_vector(&random), size));
         const ReferenceRay ray = reference_ray_rounded((Vector3){0, 0, 0}, aim);

@@ -90,6 +90,20 @@ static const Pair pairs[] = {
      "[{paraboloid: {apex: [0, 0, 0], axis: [0, 1, 0], height: 1, radius: 1, transform: {scale: [2, 3, 2], "
      "translate: [0, -1, 0]}}}]",
      "[{paraboloid: {apex: [0, -1, 0], axis: [0, 1, 0], height: 3, radius: 2}}]"},
+    {"superellipsoid",
+     "[{superellipsoid: {center: [0, 0, 0], radii: [1, 0.5, 1], exponent: 4, transform: {scale: [2, 1, 1], "
+     "rotate: [0, 0, 90], translate: [0, 0.5, 1]}}}]",
+     "[{superellipsoid: {center: [0, 0.5, 1], radii: [0.5, 2, 1], exponent: 4}}]"},
+    {"superellipsoid that is sheared and back",
+     "[{group: {transform: {matrix: [[1, 0, -0.5, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, objects: "
+     "[{superellipsoid: {center: [0, 1, 0], radii: [1, 0.5, 1], exponent: 6, transform: {matrix: "
+     "[[1, 0, 0.5, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}}}]}}]",
+     "[{superellipsoid: {center: [0, 1, 0], radii: [1, 0.5, 1], exponent: 6}}]"},
+    {"superellipsoid, a sphere, that is sheared",
+     "[{superellipsoid: {center: [0, 1, 0], radii: [1, 1, 1], exponent: 2, transform: {matrix: "
+     "[[1, 0, 0.5, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}}}]",
+     "[{sphere: {center: [0, 1, 0], radius: 1, transform: {matrix: [[1, 0, 0.5, 0], [0, 1, 0, 0], [0, 0, 1, "
+     "0]]}}}]"},
     {"mesh",
      "[{group: {transform: {scale: [1, 2, 1]}, objects: [{mesh: {file: scenes/meshes/bunny.obj, transform: "
      "{rotate: [0, 90, 0]}}}]}}]",

@@ -308,6 +308,69 @@ TEST(gives_the_same_bits_at_every_width)
     }
 }
 
+// Rays end inside a plate or needle that is thinner than the roundings of their distance. From there Newton's
+// steps onto the surface diverge, which must not move points away from their rays.
+TEST(points_of_thin_superellipsoids_stay_at_their_rays)
+{
+    static TraceRay rays[RAYS_PER_SHAPE];
+    static TraceHit hits[RAYS_PER_SHAPE];
+    Random random = {form_count + 3};
+    for (int i = 0; i < 12; i++) {
+        const double thickness = i % 3 == 0 ? 1e-5 : 1e-6,
+                     radii[3] = {1, i % 2 == 0 ? 1 : thickness, thickness};
+        const Vector3 first = random_unit_vector(&random),
+                      second = vector_normalize(vector_cross(first, random_unit_vector(&random))),
+                      axes[3] = {first, second, vector_cross(first, second)};
+        Object object = {
+            .type = SHAPE_SUPERELLIPSOID,
+            .as.superellipsoid = {.center = random_in_sphere(&random), .exponent = i % 4 < 2 ? 4 : 16}};
+        for (int k = 0; k < 3; k++)
+            object.as.superellipsoid.axes[k] = vector_scale(axes[k], radii[k]);
+        const Vector3 center = object.as.superellipsoid.center;
+        for (size_t k = 0; k < RAYS_PER_SHAPE; k++) {
+            const Vector3 aim = vector_add(center, vector_scale(first, random_between(&random, -0.5, 0.5))),
+                          origin = vector_scale(random_unit_vector(&random), k % 2 == 0 ? 20 : 100);
+            rays[k] = (TraceRay){origin, vector_subtract(aim, origin), 0, 1e30};
+        }
+        Material material;
+        const Scene scene = scene_of_shapes(&object, 1, &material);
+        for (Precision precision = probe_sound_from(); precision <= PRECISION_STRICT; precision++) {
+            if (!probe_has(precision)) continue;
+            assert_true(probe_trace(&scene, precision, 0, rays, RAYS_PER_SHAPE, hits));
+            size_t found = 0;
+            for (size_t k = 0; k < RAYS_PER_SHAPE; k++) {
+                if (hits[k].object != 0) continue;
+                found++;
+                const Vector3 at = vector_add(rays[k].origin, vector_scale(rays[k].direction, hits[k].t));
+                const double moved = vector_length(vector_subtract(hits[k].position, at)),
+                             bound = 16 * 0x1p-24 * (4 + 2 * vector_length(rays[k].origin));
+                if (!(moved <= bound))
+                    fail_msg("%s, shape %d, ray %zu: moved by %g of %g", precision_names[precision], i, k,
+                             moved, bound);
+            }
+            assert_true(found > 0);
+        }
+    }
+}
+
+// The squares of the gradients of such sizes are not numbers in float.
+TEST(superellipsoids_of_extreme_sizes_have_normals)
+{
+    if (!probe_has(PRECISION_SINGLE)) skip();
+    for (int exponent = -25; exponent <= 25; exponent += 5) {
+        const double size = pow(10, exponent);
+        Object object = {.type = SHAPE_SUPERELLIPSOID,
+                         .as.superellipsoid = {{0, 0, 0}, {{size, 0, 0}, {0, size, 0}, {0, 0, size}}, 4}};
+        Material material;
+        const Scene scene = scene_of_shapes(&object, 1, &material);
+        const TraceRay ray = {{0, 0, -4 * size}, {0, 0, 1}, 0, 1e30};
+        TraceHit hit;
+        assert_true(probe_trace(&scene, PRECISION_SINGLE, 0, &ray, 1, &hit));
+        assert_int_equal(hit.object, 0);
+        if (!(hit.normal.z < -0.999)) fail_msg("size %g: normal %g", size, hit.normal.z);
+    }
+}
+
 int main(int argument_count, char **arguments)
 {
     form_count = shape_forms(forms);

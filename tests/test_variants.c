@@ -111,6 +111,8 @@ static const struct {
      SCENE_HEAD "objects: [{torus: {center: [0, 0.5, 0], axis: [0.3, 1, 0.2], major: 1, minor: 0.4}}]\n"},
     {FEATURE_PARABOLOIDS, SCENE_HEAD
      "objects: [{paraboloid: {apex: [0, 0, 0], axis: [0.3, 1, -0.2], radius: 0.8, height: 1.2}}]\n"},
+    {FEATURE_SUPERELLIPSOIDS,
+     SCENE_HEAD "objects: [{superellipsoid: {center: [0.2, 0.5, 0], radii: [0.6, 1.2, 1], exponent: 6}}]\n"},
     {FEATURE_SPHERES | FEATURE_OVALS, SCENE_HEAD
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, transform: {scale: [0.6, 1.2, 1]}}}]\n"},
     {FEATURE_TORI | FEATURE_OVALS, SCENE_HEAD

@@ -34,12 +34,22 @@ static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, doub
            (unit <= range->torus_max && (unit >= range->torus_min || unit <= range->roundoff * reach));
 }
 
+// Returns whether coordinates in which the shape is of size 1 are in range. Their powers may be infinite,
+// which is above 1 like the coordinate, or 0.
+static bool superellipsoid_is_in_range(const CertifiedRange *range, const Superellipsoid *shape, double reach)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(shape->rows[i].w * reach <= range->reach_max)) return false;
+    return true;
+}
+
 static bool is_in_range(const CertifiedRange *range, size_t type, const void *primitive)
 {
     const double reach = primitive_reach(type, primitive);
     // a plane's distance is not squared
     if (type == TYPE_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
+    if (type == TYPE_SUPERELLIPSOIDS) return superellipsoid_is_in_range(range, primitive, reach);
     if (type == TYPE_OVALS) return oval_is_in_range(range, primitive, reach);
     if (type != TYPE_TORI) return true;
     const Torus *torus = primitive;

@@ -9,8 +9,9 @@
 // 620 u, about 2^-14.7 with the u of float, because the kernels look for an opaque surface behind a
 // transparent one up to five error bounds away (surface_find_opaque). A bound is at most 16 u per number of a
 // shape, of which a cylinder has 7, plus 4 u per coordinate of the point. Five bounds of an instance are at
-// most 140 u and 180 u times its condition, those of an oval 420 u and 120 u times its condition. For double
-// the distance is larger than needed.
+// most 140 u and 180 u times its condition, those of an oval 420 u and 120 u times its condition, and those
+// of a superellipsoid, whose point may be the ray's, 1020 u and 70 u times its condition. For double the
+// distance is larger than needed.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared. A box around all bounded opaque primitives
@@ -166,9 +167,11 @@ static Bounds lists_overlap(ContactRegionList *transparent, ContactRegionList *o
 static double conditions_largest(const CompiledScene *compiled)
 {
     double largest = compiled->instances ? compiled->instances->condition : 0;
-    const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + TYPE_OVALS];
-    for (size_t i = 0; i < array->count; i++)
-        largest = fmax(largest, ((const Oval *)array->items)[i].extent.w);
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
+        for (size_t i = 0; shape_ops[type]->condition && i < array->count; i++)
+            largest = fmax(largest, shape_ops[type]->condition(flat_array_at(array, i)));
+    }
     return largest;
 }
 

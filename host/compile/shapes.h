@@ -26,6 +26,9 @@ typedef struct {
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // Returns the largest magnitude of an unbounded primitive's numbers, as distances from the origin.
     double (*largest_coordinate)(const void *primitive);
+    // Returns the condition of a primitive, by which the kernel's rounding_scale grows beyond the sum of
+    // seven of its coordinates (host/compile/contact.c). NULL means not beyond.
+    double (*condition)(const void *primitive);
 } ShapeOps;
 
 // Indexed by ShapeType, whose values except SHAPE_MESH are those of TYPE_….

@@ -179,16 +179,17 @@ typedef struct {
 // After them come the oval, which transforms make of shapes, and the mesh. Each shape's member of Object.as
 // begins with as many positions, directions and lengths as its row counts, in this order.
 // clang-format off
-#define SCENE_SHAPE_LIST(SHAPE)              \
-    SHAPE(SPHERE,     "sphere",     1, 0, 1) \
-    SHAPE(PLANE,      "plane",      1, 1, 0) \
-    SHAPE(DISC,       "disc",       1, 1, 1) \
-    SHAPE(BOX,        "box",        2, 0, 0) \
-    SHAPE(CYLINDER,   "cylinder",   1, 1, 1) \
-    SHAPE(CONE,       "cone",       1, 1, 2) \
-    SHAPE(TRIANGLE,   "triangle",   3, 3, 0) \
-    SHAPE(TORUS,      "torus",      1, 1, 2) \
-    SHAPE(PARABOLOID, "paraboloid", 1, 1, 2)
+#define SCENE_SHAPE_LIST(SHAPE)                      \
+    SHAPE(SPHERE,         "sphere",         1, 0, 1) \
+    SHAPE(PLANE,          "plane",          1, 1, 0) \
+    SHAPE(DISC,           "disc",           1, 1, 1) \
+    SHAPE(BOX,            "box",            2, 0, 0) \
+    SHAPE(CYLINDER,       "cylinder",       1, 1, 1) \
+    SHAPE(CONE,           "cone",           1, 1, 2) \
+    SHAPE(TRIANGLE,       "triangle",       3, 3, 0) \
+    SHAPE(TORUS,          "torus",          1, 1, 2) \
+    SHAPE(PARABOLOID,     "paraboloid",     1, 1, 2) \
+    SHAPE(SUPERELLIPSOID, "superellipsoid", 1, 3, 0)
 // clang-format on
 
 #define SHAPE_ENUMERATOR(NAME, ...) SHAPE_##NAME,
@@ -250,6 +251,12 @@ typedef struct {
             double focal_length, height;
             bool finite, caps;
         } paraboloid;
+        // The points center + x axes[0] + y axes[1] + z axes[2] with |x|^n + |y|^n + |z|^n = 1 for the
+        // exponent n, an even integer.
+        struct {
+            Vector3 center, axes[3];
+            double exponent;
+        } superellipsoid;
         // A round shape that an affine map has changed to another type (host/scene/oval.h). It consists of
         // the points center + x axes[0] + y axes[1] + z axes[2] for each point (x, y, z) of a unit shape.
         // `half_height` is that of a finite unit shape. `radii` are those of a finite cone at its ends, of

@@ -61,7 +61,7 @@ static void object_print(const Object *object)
         break;
     }
     // the members of each shape begin with its doubles in a row
-    numbers_print("numbers", (const double *)(const void *)&object->as, 9);
+    numbers_print("numbers", (const double *)(const void *)&object->as, 13);
     printf("}\n");
 }
 

@@ -26,7 +26,7 @@ from exact import fraction
 PART = Fraction(1, 2**62)
 RESOLVED = 2.0**-80  # margins below this part of the size may be lost in roundings
 BEND = 0.01  # margins up to this part of the radius are proportional to distances
-SHAPES = "sphere", "plane", "disc", "box", "cylinder", "cone", "paraboloid", "triangle", "torus"
+SHAPES = "sphere", "plane", "disc", "box", "cylinder", "cone", "paraboloid", "superellipsoid", "triangle", "torus"
 SHORT = 200  # rays of a set
 LEAST = {"hit or miss": 100, "t": 60, "normal": 60}  # of each shape
 

@@ -54,6 +54,9 @@ def grown(shape, by):
     if isinstance(shape, exact.DoubleCone):
         sine = as_float(shape.slope) / sqrt(1 + as_float(shape.slope) ** 2)
         return exact.DoubleCone(shape.center, shape.axis, shape.slope, -by / sine / length(shape.axis))
+    if isinstance(shape, exact.Superellipsoid):
+        longer = [times(axis, 1 + rational(by / length(axis))) for axis in shape.axes]
+        return exact.Superellipsoid(shape.center, longer, shape.exponent)
     if isinstance(shape, exact.Paraboloid):
         # with its apex moved by s and its focal length f by g, the surface at height z moves by (f s + z g) /
         # sqrt(f (f + z)): by as much at the apex and the rim, and by less between; an infinite one at its apex

@@ -323,6 +323,31 @@ class Paraboloid(Shape):
         return [x - lean * a for x, a in zip(p, self.axis)]
 
 
+class Superellipsoid(Shape):
+    """The points center + x axes[0] + y axes[1] + z axes[2] with x^n + y^n + z^n <= 1 for the even exponent n."""
+
+    def __init__(self, center, axes, exponent):
+        self.center, self.axes, self.exponent = vector(center), [vector(axis) for axis in axes], int(exponent)
+        a, b, c = self.axes
+        volume = dot(a, cross(b, c))
+        self.rows = [[x / volume for x in row] for row in (cross(b, c), cross(c, a), cross(a, b))]
+        self.radius, self.size = min(map(length, self.axes)), sqrt(sum(length(axis) ** 2 for axis in self.axes))
+
+    def boundary_ts(self, ray):
+        f = subtract(ray.origin, self.center)
+        parts = [fmpq_poly([dot(row, f), dot(row, ray.direction)]) ** self.exponent for row in self.rows]
+        return polynomial_roots((parts[0] + parts[1] + parts[2] - 1).coeffs())
+
+    def contains(self, point):
+        p = subtract(point, self.center)
+        return sum(dot(row, p) ** self.exponent for row in self.rows) <= 1
+
+    def normal(self, point):
+        p = subtract(point, self.center)
+        powers = [dot(row, p) ** (self.exponent - 1) for row in self.rows]
+        return [sum(power * row[i] for power, row in zip(powers, self.rows)) for i in range(3)]
+
+
 class Plane(Shape):
     def __init__(self, point, normal):
         self.center, self.direction = vector(point), vector(normal)
@@ -369,7 +394,7 @@ class Triangle(Plane):
 
 
 def shape_of(given):
-    """Returns a shape by its numbers and flags, as answers.c prints them. The numbers are the nine doubles that its member of
+    """Returns a shape by its numbers and flags, as answers.c prints them. The numbers are the doubles that its member of
     Object.as (host/scene/scene.h) begins with, in their order there."""
     kind, n = given["shape"], given["numbers"]
     if kind == "sphere":
@@ -388,6 +413,8 @@ def shape_of(given):
         return DoubleCone(n[:3], n[3:6], n[8])
     if kind == "paraboloid":
         return Paraboloid(n[:3], n[3:6], n[6], n[7], not given["finite"], given["caps"])
+    if kind == "superellipsoid":
+        return Superellipsoid(n[:3], [n[3:6], n[6:9], n[9:12]], n[12])
     if kind == "triangle":
         return Triangle(n[:3], n[3:6], n[6:9])
     return Torus(n[:3], n[6], n[7], n[3:6])

@@ -82,9 +82,16 @@ static double oval_largest_coordinate(const void *primitive)
     return vector_largest((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}) + oval->sizes.x;
 }
 
+static double oval_condition(const void *primitive)
+{
+    const Oval *oval = primitive;
+    return oval->extent.w;
+}
+
 const ShapeOps oval_ops = {
     .bounds = oval_bounds,
     .flatten = oval_flatten,
     .primitive_bounds = oval_primitive_bounds,
     .largest_coordinate = oval_largest_coordinate,
+    .condition = oval_condition,
 };

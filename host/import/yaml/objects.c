@@ -1,6 +1,7 @@
 #include "host/base/array.h"
 #include "host/import/place.h"
 #include "host/import/yaml/yaml.h"
+#include "host/scene/oval.h"
 #include "host/scene/polygon.h"
 #include "host/scene/portable.h"
 
@@ -162,6 +163,30 @@ static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form 
     return true;
 }
 
+static const Range range_exponent = {2, 16, false, "an even number from 2 to 16"};
+
+// Until superellipsoid_finish the first axis holds `radii`.
+static const Field superellipsoid_fields[] = {
+    {"center", read_vector, offsetof(Object, as.superellipsoid.center), REQUIRED},
+    {"radii", read_vector, offsetof(Object, as.superellipsoid.axes), REQUIRED, &range_positive},
+    {"exponent", read_number, offsetof(Object, as.superellipsoid.exponent), REQUIRED, &range_exponent},
+    EVERY_SHAPE,
+};
+
+static bool superellipsoid_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
+{
+    (void)form;
+    Vector3 *axes = object->as.superellipsoid.axes;
+    const Vector3 radii = axes[0];
+    axes[0] = (Vector3){radii.x, 0, 0};
+    axes[1] = (Vector3){0, radii.y, 0};
+    axes[2] = (Vector3){0, 0, radii.z};
+    if (!axes_are_moderate(axes))
+        return field_fails(reader, mapping, "radii", "'radii' must be within a factor of a million");
+    return fmod(object->as.superellipsoid.exponent, 2) == 0 ||
+           field_fails(reader, mapping, "exponent", "'exponent' must be an even number from 2 to 16");
+}
+
 typedef struct {
     Object start; // defaults
     const Field *fields;
@@ -186,6 +211,7 @@ static const Shape shapes[SHAPE_OVAL] = {
      FIELDS(paraboloid_fields),
      paraboloid_finish,
      false},
+    {{.type = SHAPE_SUPERELLIPSOID}, FIELDS(superellipsoid_fields), superellipsoid_finish, false},
 };
 
 bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *mapping)
