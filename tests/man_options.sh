@@ -59,6 +59,8 @@ offers 'glint render --lanes 1' '1 16'
 offers 'glint render --tone f' filmic
 offers 'glint render --format p' 'png ppm'
 offers 'glint verify --format j' 'json junit'
+offers 'glint diff --format b' ''
+offers 'glint bench --format b' benchmark
 offers 'glint bench --device g' gpu
 offers 'glint render --precision ' 'single strict double certified'
 offers 'glint trace --precision ' 'single strict double certified'

@@ -56,7 +56,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint accuracy SCENE... [OPTIONS]\n\n"
              "Measures speed and error of scenes in every requested configuration. The reference takes the "
              "largest of --samples.\n",
-    .groups = {OPTIONS(command_options), VARIANT_OPTIONS, OPTIONS(perturb_option), REPORT_OPTIONS},
+    .groups = {OPTIONS(command_options), VARIANT_OPTIONS, OPTIONS(perturb_option), TIMED_REPORT_OPTIONS},
     OPERANDS(SCENES, AccuracyOptions, scenes),
     .check = options_check};
 

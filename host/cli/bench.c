@@ -141,7 +141,7 @@ static const CommandLine command_line = {
         "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
         "same or faster,\n3 slower, 4 too noisy to decide.\n",
     .groups = {OPTIONS(command_options), OPTIONS(precisions_option), VARIANT_OPTIONS, OPTIONS(driver_options),
-               OPTIONS(keep_kernels_option), REPORT_OPTIONS},
+               OPTIONS(keep_kernels_option), TIMED_REPORT_OPTIONS},
     OPERANDS(SCENES, BenchOptions, scenes),
     .check = options_check};
 

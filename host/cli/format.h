@@ -11,7 +11,7 @@ typedef enum {
     FORMAT_CSV,
     FORMAT_MARKDOWN,
     FORMAT_JUNIT,     // one test case per row, as CI systems show them
-    FORMAT_BENCHMARK, // google/benchmark's JSON
+    FORMAT_BENCHMARK, // google/benchmark's JSON, which needs times
     FORMAT_COUNT
 } ReportFormat;
 
@@ -47,17 +47,22 @@ typedef struct {
 // Returns the heading of a column.
 ShortText column_heading(const char *column);
 
-enum { REPORT_FORMAT, REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
+extern const Option format_option, timed_format_option; // the latter of commands that measure times
+
+enum { REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
 extern const Option report_options[REPORT_OPTION_COUNT];
 // Chooses the format by the file's ending if no other is given. Returns a mistake if the ending names no
-// format, or if the format needs times and the command measures none.
+// format.
 OptionCheck report_options_check;
-// The group of the options of CommonOptions.report, which must follow those of options that create folders,
+// The groups of the options of CommonOptions.report, which must follow those of options that create folders,
 // since the file may be in one.
-#define REPORT_OPTIONS                                                                                       \
+#define REPORT_OPTIONS_OF(format)                                                                            \
+    OPTION(format),                                                                                          \
     {                                                                                                        \
         .items = report_options, .count = COUNT_OF(report_options), .check = report_options_check            \
     }
+#define REPORT_OPTIONS       REPORT_OPTIONS_OF(format_option)
+#define TIMED_REPORT_OPTIONS REPORT_OPTIONS_OF(timed_format_option)
 
 // Returns whether the command prints its text.
 static inline bool report_has_text(const ReportOptions *options)
