@@ -187,6 +187,11 @@ for line in worker.stdout:
         self.refuses(f"{command} ./other --device none-such", "none-such")
         write("other", "#!/bin/sh\nkill -INT $PPID\necho 'glint: interrupted' >&2\nexit 130\n")
         self.assertEqual(self.glint(f"{command} ./other", status=130).stderr, "glint: interrupted\n")
+        write("other", "#!/bin/sh\nfor i in /proc/[0-9]*; do\n    case $(cut -d ' ' -f 4 $i/stat 2>/dev/null) in\n"
+                       "    $PPID) [ ${i#/proc/} = $$ ] || kill -KILL ${i#/proc/} ;;\n    esac\ndone\n"
+                       f"exec {PROGRAM} \"$@\"\n")
+        process = self.glint(f"{command} ./other", status=2)
+        self.assertIn(f"'{os.path.realpath(PROGRAM)}' was ended by signal 9", process.stderr)
         write("other", f"#!/bin/sh\nexec {PROGRAM} \"$@\" --device none-such\n")
         self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 

@@ -10,6 +10,7 @@
 #include "host/cli/report_json.h"
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <signal.h>
 #include <spawn.h>
@@ -42,7 +43,7 @@ int bench_work(VariantSet *set, Compute *compute)
 }
 
 typedef struct {
-    const char *program;
+    const char *name, *path; // as messages print it, and as it is started
     pid_t process;
     FILE *requests, *replies, *errors;
 } MeasuredProgram;
@@ -50,7 +51,7 @@ typedef struct {
 typedef struct {
     const AgainstOptions *options;
     VariantSet *set;
-    const char *programs[2]; // this program and the other
+    MeasuredProgram programs[2]; // this program and the other, not started
     struct {
         Series ratios;    // the logarithms of the ratios, one per pair
         Series frames[2]; // the seconds of all runs of this program and of the other
@@ -71,7 +72,7 @@ static int worker_close(MeasuredProgram *worker)
         while (waitpid(worker->process, &ended, 0) < 0 && errno == EINTR)
             continue;
         status = WIFEXITED(ended) ? WEXITSTATUS(ended) : EXIT_MACHINE;
-        if (WIFSIGNALED(ended)) stderr_print("'%s' was ended by signal %d", worker->program, WTERMSIG(ended));
+        if (WIFSIGNALED(ended)) stderr_print("'%s' was ended by signal %d", worker->name, WTERMSIG(ended));
     }
     if (worker->errors) {
         char line[512];
@@ -90,7 +91,7 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
     // --worker comes first, since an argument "--" ends the options
     char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
     char bench[] = "bench", work[] = "--worker";
-    arguments[0] = memory_copy_text(worker->program);
+    arguments[0] = memory_copy_text(worker->name);
     arguments[1] = bench;
     arguments[2] = work;
     for (int i = 1; i < options->argument_count; i++)
@@ -101,14 +102,14 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
         posix_spawn_file_actions_adddup2(&actions, to[0], STDIN_FILENO);
         posix_spawn_file_actions_adddup2(&actions, from[1], STDOUT_FILENO);
         posix_spawn_file_actions_adddup2(&actions, fileno(worker->errors), STDERR_FILENO);
-        error = posix_spawnp(&worker->process, worker->program, &actions, NULL, arguments, environ);
+        error = posix_spawnp(&worker->process, worker->path, &actions, NULL, arguments, environ);
         posix_spawn_file_actions_destroy(&actions);
     }
     free(arguments[0]);
     free(arguments);
     if (error) {
         worker->process = 0;
-        stderr_print("cannot run '%s': %s", worker->program, strerror(error));
+        stderr_print("cannot run '%s': %s", worker->name, strerror(error));
     }
     return !error;
 }
@@ -130,17 +131,17 @@ static bool worker_greets(MeasuredProgram *worker, size_t row_count)
     snprintf(expected, sizeof expected, greeting, row_count);
     if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
     if (!worker_is_interrupted(worker))
-        stderr_print("'%s' does not answer as a glint with bench --against does", worker->program);
+        stderr_print("'%s' does not answer as a glint with bench --against does", worker->name);
     return false;
 }
 
 // Starts a worker and waits until it is warm.
-static bool worker_open(MeasuredProgram *worker, const char *program, const Against *against)
+static bool worker_open(MeasuredProgram *worker, const Against *against)
 {
-    *worker = (MeasuredProgram){.program = program, .errors = tmpfile()};
+    worker->errors = tmpfile();
     int to[2] = {-1, -1}, from[2] = {-1, -1};
     bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0;
-    if (!ready) stderr_print("cannot run '%s': %s", program, strerror(errno));
+    if (!ready) stderr_print("cannot run '%s': %s", worker->name, strerror(errno));
     bool spawned = ready && worker_spawn(worker, against->options, to, from);
     if (to[0] >= 0) close(to[0]);
     if (from[1] >= 0) close(from[1]);
@@ -172,7 +173,7 @@ static bool worker_run(MeasuredProgram *worker, double *seconds, size_t row_coun
     fputc('\n', worker->requests);
     fflush(worker->requests);
     bool whole = reply_read(worker->replies, seconds, row_count);
-    if (!whole && !worker_is_interrupted(worker)) stderr_print("'%s' exited early", worker->program);
+    if (!whole && !worker_is_interrupted(worker)) stderr_print("'%s' exited early", worker->name);
     return whole;
 }
 
@@ -220,14 +221,15 @@ static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair
 // Measures with a new pair of processes. Returns the exit status.
 static int pair_run(Against *against, size_t pair)
 {
-    MeasuredProgram workers[2] = {{0}};
-    bool whole = true;
-    for (size_t turn = 0; turn < 2 && whole; turn++) {
+    MeasuredProgram workers[2] = {against->programs[0], against->programs[1]};
+    int status = EXIT_DONE;
+    for (size_t turn = 0; turn < 2 && status == EXIT_DONE; turn++) {
         size_t which = (turn + other_is_first(pair)) % 2;
-        whole = worker_open(&workers[which], against->programs[which], against);
+        if (worker_open(&workers[which], against)) continue;
+        // only the other program was named by the user
+        status = which == 0 && workers[which].process <= 0 ? EXIT_MACHINE : EXIT_USER;
     }
-    whole = whole && pair_measure(against, workers, pair);
-    int status = whole ? EXIT_DONE : EXIT_USER;
+    if (status == EXIT_DONE && !pair_measure(against, workers, pair)) status = EXIT_USER;
     for (size_t which = 0; which < 2; which++) {
         bool was_started = workers[which].process > 0;
         int ended = worker_close(&workers[which]);
@@ -311,10 +313,16 @@ static void against_print_text(const Against *against, const Device *device)
 
 int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device)
 {
+    char self[PATH_MAX] = "";
+    if (readlink("/proc/self/exe", self, sizeof self - 1) < 0) {
+        stderr_print("--against needs /proc");
+        return EXIT_MACHINE;
+    }
     Against against = {
         .options = options,
         .set = set,
-        .programs = {"/proc/self/exe", options->other},
+        .programs = {{.name = self, .path = "/proc/self/exe"},
+                     {.name = options->other, .path = options->other}},
         .rows = memory_allocate_zeroed(set->count, sizeof *against.rows),
         .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
     };
