@@ -92,8 +92,7 @@ static void pick_append(Text *text, const AccuracyScene *scene, const AccuracyRe
         text_appendf(text, "; %zu pixel%s at silhouettes show%s another object", objects,
                      text_plural(objects), objects == 1 ? "s" : "");
     if (shadows > 0)
-        text_appendf(text, "; %zu shadow%s wrong at %s", shadows, shadows == 1 ? " is" : "s are",
-                     shadows == 1 ? "its edge" : "their edges");
+        text_appendf(text, "; %zu shadow bit%s wrong at edges", shadows, shadows == 1 ? " is" : "s are");
 }
 
 Text accuracy_pick_sentence(const AccuracyScene *scene, size_t pick)

@@ -97,7 +97,7 @@ function drawPicks(scene) {
                 status === "reference" ? "the reference itself" : `error ${formatNumber(error)}`,
                 ...drawCertainty(scene, picks[0]),
                 objects ? `; ${plural(objects, "pixel")} at silhouettes ${objects === 1 ? "shows" : "show"} another object` : "",
-                shadows ? `; ${plural(shadows, "shadow is wrong at its edge", "shadows are wrong at their edges")}` : "", ".");
+                shadows ? `; ${plural(shadows, "shadow bit is wrong at edges", "shadow bits are wrong at edges")}` : "", ".");
     return item;
   });
 }
