@@ -1,12 +1,12 @@
-# Provides what the shell tests share, which source it first. GLINT is the program under test, BUILD the folder it was built in,
-# also as $build, and $make is the make to use.
+# Provides what the shell tests share, which source it first. GLINT is the program under test, $build the folder BUILD for
+# what a test builds, and $make the make to use.
 # Kernel caches, glint's own and the drivers', are those of XDG_CACHE_HOME, shared by the tests of a run; $scratch is removed in
 # the end.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 GLINT=$(realpath "${GLINT:-build/glint}") || exit 1
 [ -x "$GLINT" ] || { echo "there is no program $GLINT: make, or set GLINT"; exit 1; }
-build=${BUILD:-$(dirname "$GLINT")} make=${MAKE:-make}
+build=${BUILD:-build} make=${MAKE:-make}
 export LC_ALL=C
 unset GLINT_DEVICE
 
@@ -73,4 +73,4 @@ python_with() {
     exec {lock}>&-
 }
 is_long() { [ "${GLINT_LONG_TESTS-}" = 1 ]; }
-is_sanitized() { case $build in *-sanitize) true ;; *) false ;; esac; }
+is_sanitized() { case $(dirname "$GLINT") in *-sanitize) true ;; *) false ;; esac; }
