@@ -87,14 +87,15 @@ class Report(TestCase):
         self.assertFalse([name for name, text in files.items() if "not for others" in text])
 
     def test_rejected_kernels(self):
-        """The index names the steps that fail, and the logs say why."""
-        errors, files = self.report(f"{SMALL} --build-options=-Dget_global_id=unknown_word")
+        """The index names the steps that fail, and the logs say why. The root folder is not replaced by ~."""
+        errors, files = self.report(f"{SMALL} --build-options=-Dget_global_id=unknown_word", HOME="//", CL_EXAMPLE="1 / 2")
         self.assertEqual([step for step, _ in self.failures(files)], ["verify", "bench"])
         self.assertEqual(errors.count("warning: the step "), 2)
         logs = "".join(text for name, text in files.items() if name.endswith(".log") and name.startswith("kernels/"))
         self.assertRegex(logs, "build: CL_BUILD_PROGRAM_FAILURE")
         self.assertIn("unknown_word", logs)
         self.assertIn("clBuildProgram", files["verify.log"])
+        self.assertIn("\nCL_EXAMPLE=1 / 2\n", files["versions.txt"])
 
     @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
     def test_crashes_and_hangs(self):

@@ -11,10 +11,11 @@
 static void word_add(Scrubber *scrubber, const char *word, const char *replacement, bool is_path)
 {
     // a root folder or a name that every system has identifies nobody
-    if (!word || strlen(word) < 2 || strcmp(word, "root") == 0 || strcmp(word, "localhost") == 0) return;
+    if (!word || strcmp(word, "root") == 0 || strcmp(word, "localhost") == 0) return;
     size_t length = strlen(word);
-    while (is_path && length > 1 && word[length - 1] == '/')
+    while (is_path && length > 0 && word[length - 1] == '/')
         length--;
+    if (length < 2) return;
     scrubber->words[scrubber->count].word = memory_copy_part(word, length);
     scrubber->words[scrubber->count].replacement = replacement;
     scrubber->words[scrubber->count++].is_path = is_path;
