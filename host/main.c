@@ -42,15 +42,30 @@ static bool file_exists(const char *path)
     return stat(path, &status) == 0 && !S_ISDIR(status.st_mode);
 }
 
+// Returns whether a folder of the PATH has the file, which may be one that cannot be started.
+static bool path_has(const char *name)
+{
+    bool is_there = false;
+    for (const char *at = getenv("PATH"); at && !is_there;) {
+        const size_t length = strcspn(at, ":");
+        char *path = text_format("%.*s/%s", length > 0 ? (int)length : 1, length > 0 ? at : ".", name);
+        is_there = file_exists(path);
+        free(path);
+        at = at[length] == ':' ? at + length + 1 : NULL;
+    }
+    return is_there;
+}
+
 // Starts glint-NAME if there is such a program on the PATH, as git does: the Python package has glint-locate.
 static void program_start(const char *name, char **arguments)
 {
     if (strchr(name, '/')) return;
     char *program = text_format("glint-%s", name);
     execvp(program, arguments);
-    // EACCES may come from a folder of the PATH that cannot be searched
-    if (errno != ENOENT && errno != EACCES) stderr_print("cannot start %s: %s", program, strerror(errno));
-    if (strcmp(name, "locate") == 0)
+    const int error = errno; // which may be that of a folder of the PATH that cannot be searched
+    if (path_has(program))
+        stderr_print("cannot start %s: %s", program, strerror(error));
+    else if (strcmp(name, "locate") == 0)
         stderr_print("glint locate needs glint's Python package with the extra [locate]");
     free(program);
 }

@@ -101,8 +101,11 @@ class Commands(TestCase):
                     self.refuses(command, pattern)
 
     def test_program_that_cannot_be_started(self):
+        unknown = r'glint: unknown command "rendr"; did you mean render\?\n\Z'
+        write("file", "")
+        self.refuses("rendr", rf"\A{unknown}", env={"PATH": os.path.abspath("file")})
         write("glint-rendr", "")
-        self.refuses("rendr", r'\Aglint: unknown command "rendr"; did you mean render\?\n\Z', env={"PATH": os.getcwd()})
+        self.refuses("rendr", rf"\Aglint: cannot start glint-rendr: Permission denied\n{unknown}", env={"PATH": f"{os.getcwd()}:/none"})
 
     def test_help_lists_the_precisions_that_are_accepted(self):
         for command, arguments in PRECISION_COMMANDS.items():
