@@ -204,7 +204,7 @@ BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, u
     return rows;
 }
 
-// Passes the next band to the sink. The mutex is not held meanwhile.
+// Forwards the next band to the sink. The mutex is not held meanwhile.
 static void band_forward(Scheduler *scheduler, const Film *band)
 {
     const uint32_t end = band->first_row + band->height;
@@ -231,7 +231,7 @@ static bool waiting_acquire(Scheduler *scheduler, Film *band)
     return false;
 }
 
-// Passes the waiting bands up to the first missing row to the sink, unless another thread is doing so.
+// Forwards the waiting bands up to the first missing row to the sink, unless another thread is doing so.
 static void waiting_forward(Scheduler *scheduler)
 {
     Film band;

@@ -38,13 +38,13 @@ static LoopState state_run(FrameLoop *loop, LoopState state)
     case LOOP_BEGIN:
         loop->is_complete = false;
         if (loop->current.scene_frame != loop->scene_frame) scene_reload(loop);
-        return request_begin(loop) ? LOOP_PREVIEW : LOOP_PASSES;
+        return request_begin(loop) ? LOOP_PREVIEW : LOOP_ROUNDS;
     case LOOP_PREVIEW:
         return preview_render(loop) ? LOOP_REST : LOOP_WAIT;
     case LOOP_REST:
-        return camera_rests(loop) ? LOOP_PASSES : LOOP_WAIT;
-    case LOOP_PASSES:
-        loop->is_complete = passes_render(loop);
+        return camera_rests(loop) ? LOOP_ROUNDS : LOOP_WAIT;
+    case LOOP_ROUNDS:
+        loop->is_complete = rounds_render(loop);
         return loop->is_complete && loop->current.view == VIEW_ERROR ? LOOP_ERRORS : LOOP_WAIT;
     case LOOP_ERRORS:
         loop->is_complete = errors_render(loop);

@@ -1,5 +1,5 @@
 // Renders what the window shows on a separate thread. While the camera moves, it renders coarse frames, and
-// at rest the image in passes until it has all samples. A new request ends the work on the previous one. The
+// at rest the image in rounds until it has all samples. A new request ends the work on the previous one. The
 // scene is re-read when its files change and for another frame of an animation.
 #pragma once
 

@@ -10,8 +10,8 @@
 // The states of the loop's thread. state_run does the work of each and returns the next one:
 //
 //     WAIT ──files changed──▶ RELOAD ──image due──▶ BEGIN
-//       ├────request────────▶ BEGIN ──coarse frame first──▶ PREVIEW ──▶ REST ──▶ PASSES
-//       │                       └─────full size at once───────────────────────▶ PASSES ──error view──▶ ERRORS
+//       ├────request────────▶ BEGIN ──coarse frame first──▶ PREVIEW ──▶ REST ──▶ ROUNDS
+//       │                       └─────full size at once───────────────────────▶ ROUNDS ──error view──▶ ERRORS
 //       ├────question───────▶ PROBE
 //       ├────complete image─▶ SAVE
 //       └────closed─────────▶ END
@@ -24,7 +24,7 @@ typedef enum {
     LOOP_BEGIN,   // starts on the request, and reads the scene if the request is for another of its frames
     LOOP_PREVIEW, // renders a coarse frame
     LOOP_REST,    // waits until the camera rests
-    LOOP_PASSES,  // renders the image in passes
+    LOOP_ROUNDS,  // renders the image in rounds
     LOOP_ERRORS,  // replaces the image by its heat map of errors
     LOOP_PROBE,   // answers a question about a pixel
     LOOP_SAVE,    // saves the image
@@ -137,9 +137,9 @@ void distances_fill(FrameLoop *loop);
 
 // Chooses how the current request begins. Returns true if that is by a preview.
 bool request_begin(FrameLoop *loop);
-// Return false if the render was ended or failed. errors_render follows passes_render.
+// Return false if the render was ended or failed. errors_render follows rounds_render.
 bool preview_render(FrameLoop *loop);
-bool passes_render(FrameLoop *loop);
+bool rounds_render(FrameLoop *loop);
 bool errors_render(FrameLoop *loop);
 // Waits until no request has come for a while if a move to another eye takes long, as in a large scene.
 // Returns false if one came.

@@ -1,4 +1,4 @@
-// Renders a coarse frame for each request of a moving camera, and then the image in passes.
+// Renders a coarse frame for each request of a moving camera, and then the image in rounds.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/clock.h"
@@ -34,7 +34,7 @@ static bool preview_receive(void *context, const Film *band)
     return true;
 }
 
-static bool pass_receive(void *context, const Film *band)
+static bool round_receive(void *context, const Film *band)
 {
     const uint32_t samples = band->samples;
     FrameLoop *loop = context;
@@ -46,7 +46,7 @@ static bool pass_receive(void *context, const Film *band)
     if (is_first && loop->current.is_moving && !loop->has_preview)
         preview_record(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
                        (double)film_pixel_count(&loop->film));
-    if (is_first && view_aovs[loop->current.view]) return true; // its AOVs follow the first pass
+    if (is_first && view_aovs[loop->current.view]) return true; // its AOVs follow the first round
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
     frame_publish(loop, samples);
@@ -147,7 +147,7 @@ bool preview_render(FrameLoop *loop)
     return true;
 }
 
-bool passes_render(FrameLoop *loop)
+bool rounds_render(FrameLoop *loop)
 {
     const View view = loop->current.view;
     const unsigned aovs = AOV_T | view_aovs[view];
@@ -155,7 +155,7 @@ bool passes_render(FrameLoop *loop)
     if (!renderer_prepare(loop, 1, samples, false)) return false;
     film_fit(loop, aovs);
     atomic_store(&loop->first_is_due, loop->current.is_moving && !loop->has_preview);
-    return renderer_accumulate(loop->renderer, aovs, pass_receive, loop);
+    return renderer_accumulate(loop->renderer, aovs, round_receive, loop);
 }
 
 typedef struct {

@@ -1,4 +1,4 @@
-// Checks that an image rendered in passes, or by a renderer whose camera was moved, has the bits of one
+// Checks that an image rendered in rounds, or by a renderer whose camera was moved, has the bits of one
 // rendered at once. A preview's may differ by roundings.
 // run_tests: sanitize-long-only
 #include "tests/check.h"
@@ -30,7 +30,7 @@ static bool band_receive(void *context, const Film *band)
     return true;
 }
 
-TEST(passes_give_the_bits_of_one_render)
+TEST(rounds_give_the_bits_of_one_render)
 {
     OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
@@ -44,13 +44,13 @@ TEST(passes_give_the_bits_of_one_render)
     assert_int_equal(received.samples, SAMPLES);
     assert_int_equal(received.aov_bands, 5);
     assert_true(received.color_bands >= 10 && received.color_bands % 5 == 0);
-    film_assert_same(&received.film, &expected, "passes");
+    film_assert_same(&received.film, &expected, "rounds");
     film_free(&received.film);
     renderer_close(renderer);
 }
 
 // The last sample of `certified` flags pixels after the AOVs were delivered.
-TEST(passes_flag_the_pixels_of_one_render)
+TEST(rounds_flag_the_pixels_of_one_render)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     OwnedScene scene = scene_of_file("tests/scenes/mirror-balls.yaml");
@@ -60,7 +60,7 @@ TEST(passes_flag_the_pixels_of_one_render)
     Renderer *renderer = probe_renderer(&scene, &settings);
     Received received = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOV_FLAG)};
     assert_true(renderer_accumulate(renderer, AOV_FLAG, band_receive, &received));
-    film_assert_same(&received.film, &expected, "flags of passes");
+    film_assert_same(&received.film, &expected, "flags of rounds");
     film_free(&received.film);
     renderer_close(renderer);
 }
@@ -102,7 +102,7 @@ static bool stop_now(void *context)
     return stop_countdown-- == 0;
 }
 
-TEST(passes_stop)
+TEST(rounds_stop)
 {
     OwnedScene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
