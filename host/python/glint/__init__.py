@@ -299,7 +299,7 @@ class Scene:
                     tracer = self._tracers.setdefault(key, made)
             _h.call(function, tracer, *arguments)
 
-    def device_forget(self, device: _h.Handle) -> None:
+    def _device_forget(self, device: _h.Handle) -> None:
         """Closes the tracers of a device, which failed."""
         with self._lock:
             dropped = self._tracers  # which are closed after the lock is released

@@ -87,9 +87,17 @@ _users: weakref.WeakSet[Any] = weakref.WeakSet()  # guarded by the lock
 
 
 def device_users_add(user: Any) -> None:
-    """Adds an object whose `device_forget` is called with each device that fails."""
+    """Adds an object whose `_device_forget` is called with each device that fails."""
     with _opened_lock:
         _users.add(user)
+
+
+# a function, so that the exception's traceback does not keep the users alive
+def _device_forget(device: Handle) -> None:
+    with _opened_lock:
+        users = list(_users)
+    for user in users:
+        user._device_forget(device)
 
 
 @contextlib.contextmanager
@@ -109,7 +117,5 @@ def device_opened(selector: Selector) -> Iterator[Handle]:
         with _opened_lock:
             if _opened.get(key) is device:
                 del _opened[key]
-            users = list(_users)
-        for user in users:
-            user.device_forget(device)
+        _device_forget(device)
         raise
