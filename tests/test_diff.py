@@ -76,7 +76,7 @@ class Diff(TestCase):
             ("plain.ppm", "two"),
             (f"plain.ppm {ROOT}/scenes/demo.yaml", "demo.yaml"),
             ("plain.ppm spot.ppm --heatmap map.jpg", r"\.png"),
-            ("plain.ppm same.ppm --layer depth", "--layer is for EXR files, but neither image is one"),
+            ("plain.ppm same.ppm --layer depth", "--layer is for EXR files, but neither name ends in .exr"),
             ("plain.ppm spot.ppm --heatmap none/map.png", "none/map.png"),
             ("plain.ppm spot.ppm --max-ulp 1", '--max-ulp: "plain.ppm" and "spot.ppm" do not both have floating-point values'),
             ("t.npy t.npy --max-flip 1", '--max-flip: "t.npy" and "t.npy" do not both have colors'),

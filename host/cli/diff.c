@@ -67,7 +67,7 @@ static const char *options_check(void *diff_options)
         return "the heat map's name must end in .png, .ppm, .exr or .npy";
     if (options->layer && image_format_of(options->reference_path) != IMAGE_EXR &&
         image_format_of(options->test_path) != IMAGE_EXR)
-        return "--layer is for EXR files, but neither image is one";
+        return "--layer is for EXR files, but neither name ends in .exr";
     return NULL;
 }
 
