@@ -25,8 +25,8 @@ struct GlintTracer {
 };
 
 // Copies a caller's struct, which may be of another version of the interface, to `full`, a struct of this
-// version. Returns false with a message that names its type if its size is not set or if a member that this
-// version does not know is not 0.
+// version. Returns false with a message that names its type if it is NULL, if its size is not set or if a
+// member that this version does not know is not 0.
 bool struct_read(void *full, size_t full_size, const void *given, const char *type, MessageList *messages);
 
 // Copies a struct of this version over the caller's, which may be of another version of the interface and

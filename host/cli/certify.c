@@ -75,14 +75,12 @@ static void certified_print(const CertifyErrors *errors, const CertifyUncertifie
            CERTIFIED_COLOR_ERROR);
     if (errors->unconfirmed > 0)
         printf("             certified decides %zu pixel%s that the reference leaves uncertain; %zu of them "
-               "differ "
-               "from it\n",
+               "differ from it\n",
                errors->unconfirmed, text_plural(errors->unconfirmed), errors->contradicted);
     if (uncertified->count == 0) return;
     printf(
         "             %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
-        "are "
-        "within 2^-49, %zu neither\n",
+        "are within 2^-49, %zu neither\n",
         uncertified->count, text_plural(uncertified->count), uncertified->examined, uncertified->witnessed,
         uncertified->close, uncertified->examined - uncertified->witnessed - uncertified->close);
 }

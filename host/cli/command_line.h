@@ -132,9 +132,9 @@ bool digits_read(const char *value, const char **end, uint64_t *result);
 bool option_fault(const Option *option, const char *value, const char *expected, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Prints that the command was interrupted, unless it has, and flushes standard output. A later fault is only
-// a warning. Returns the exit status, which is EXIT_MACHINE with a message if the output could not be
-// written.
+// Prints that the command was interrupted, unless it has already done so. Flushes standard output. A later
+// fault then causes only a warning. Returns the exit status, which is EXIT_MACHINE with a message if the
+// output could not be written.
 int command_finish(int status);
 
 // Prints a line to standard error, after "glint: ". Returns false, so that a function can return its error.

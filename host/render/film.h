@@ -63,9 +63,10 @@ enum { FLAG_RERENDERED = 1, FLAG_UNCERTIFIED };
 typedef struct {
     uint32_t width, height, light_count;
     uint32_t first_row; // of the band, counted in the region
-    uint32_t
-        samples;    // in the color, their sum until all are in, then their mean; 0 if not delivered as a band
-    bool is_double; // whether it was computed in double
+    // The number of samples in the color, which is their sum until it has all of them and then their mean. 0
+    // unless the film was delivered as a band.
+    uint32_t samples;
+    bool is_double;   // whether it was computed in double
     size_t real_size; // sizeof(float) in a band that was computed in float, else sizeof(double)
     RerenderCounts rerenders;
     union {
