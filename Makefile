@@ -191,11 +191,6 @@ $(BUILD)/tests/test_certify_status: private LDFLAGS += -Wl,--wrap=renderer_rende
 
 # make fuzz builds $(BUILD)-fuzz/fuzz for tools/fuzz, which runs every reader under libFuzzer, with Debian's newest clang.
 CLANG ?= $(or $(lastword $(sort $(wildcard /usr/bin/clang-[1-9][0-9]))),clang)
-fuzz_sources := $(wildcard host/base/*.c host/image/*.c host/import/*.c host/import/*/*.c host/scene/*.c) \
-                $(addprefix host/,measure/baseline.c measure/calibration.c measure/series.c opencl/cache.c render/checkpoint.c \
-                render/film.c) \
-                tests/fuzz/readers.c
-fuzz_objects := $(fuzz_sources:%.c=$(BUILD)/%.o)
 
 fuzz:
 	+$(MAKE) BUILD=$(BUILD)-fuzz CC='$(CLANG)' CFLAGS='-O2 -g' \
@@ -206,7 +201,7 @@ ifneq ($(filter %-fuzz,$(BUILD)),)
 $(patsubst %.c,$(BUILD)/%.o,$(wildcard host/base/*.c) tests/fuzz/readers.c): private OURS += -fno-sanitize=fuzzer-no-link
 endif
 
-$(BUILD)/fuzz: $(fuzz_objects)
+$(BUILD)/fuzz: $(BUILD)/tests/fuzz/readers.o $(BUILD)/tests.a
 	$(CC) $(OURS) $(CFLAGS) -fsanitize=fuzzer $(LDFLAGS) $^ $(LIBS) -o $@
 
 # make features, kernel_text and ladder build these programs.
