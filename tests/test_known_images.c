@@ -410,6 +410,24 @@ TEST_AT_EACH_PRECISION(thin_torus_next_to_eye)
     }
 }
 
+// Rays that leave a torus from a point on it do not hit it there. The first eye is on the outer equator. The
+// second one is on the inner equator and sees the opposite side of the tube.
+TEST_AT_EACH_PRECISION(torus_seen_from_its_surface)
+{
+    OwnedScene outside = scene_of("camera: {position: [3, 0, 0], look_at: [4, 0, 0], fov: 60}\n"
+                                  "objects: [{torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, "
+                                  "minor: 1}}]\n");
+    OwnedFilm nothing = render(&outside, 15, 15, precision, AOV_OBJECT);
+    for (size_t i = 0; i < film_pixel_count(&nothing); i++)
+        check(nothing.object[i] == UINT32_MAX);
+    OwnedScene hole = scene_of("camera: {position: [1.5, 0, 0], look_at: [0, 0, 0], fov: 10}\n"
+                               "objects: [{torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, "
+                               "minor: 0.5}}]\n");
+    OwnedFilm opposite = render(&hole, 15, 15, precision, AOV_T);
+    for (size_t i = 0; i < film_pixel_count(&opposite); i++)
+        check(opposite.t[i] > 2.9 && opposite.t[i] < 3.1);
+}
+
 // A paraboloid with the focal length f, seen from outside at the height h = 10^6 above its apex, where its
 // radius is 2 sqrt(f h).
 static void check_deep_paraboloid(double distance, Precision precision)

@@ -135,9 +135,11 @@ static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit, 
             end = lanes_select(hides, turn, high);
             value_at_end = torus_tube_value_at(&tube, ray, end, &slope);
         }
-        mask first = hit & !found & (entering != (value_at_end > 0));
-        if (lanes_any(first)) {
-            real_replace(t, first, torus_tube_zero(&tube, ray, (Interval){low, end}, entering));
+        mask crosses = hit & !found & (entering != (value_at_end > 0));
+        if (lanes_any(crosses)) {
+            real zero = torus_tube_zero(&tube, ray, (Interval){low, end}, entering);
+            mask first = crosses & (zero > ray->tmin); // the ray may start on the surface
+            real_replace(t, first, zero);
             found = found | first;
         }
         low = high;
