@@ -200,11 +200,14 @@ static inline scalar_integer lanes_smallest(integer value)
 // clang's builtin for the x86 instruction that packs a mask into bits. The fallback below takes about ten
 // instructions.
 #ifdef __x86_64__
-#if __clang_major__ >= 18 && __clang_major__ <= 20 && !defined(__EVEX512__)
-// these need EVEX512 for vectors of 512 bits
-#elif LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
+#if defined(__AVX512DQ__) && (__clang_major__ < 18 || __clang_major__ > 20 || defined(__EVEX512__))
+#define HAS_MASKS_OF_512_BITS 1
+#else
+#define HAS_MASKS_OF_512_BITS 0 // clang 18 to 20 may have AVX-512 without its vectors of 512 bits
+#endif
+#if LANES == 16 && !IS_DOUBLE && HAS_MASKS_OF_512_BITS && __has_builtin(__builtin_ia32_cvtd2mask512)
 #define MASK_BITS __builtin_ia32_cvtd2mask512
-#elif LANES == 8 && IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtq2mask512)
+#elif LANES == 8 && IS_DOUBLE && HAS_MASKS_OF_512_BITS && __has_builtin(__builtin_ia32_cvtq2mask512)
 #define MASK_BITS __builtin_ia32_cvtq2mask512
 #elif LANES == 8 && !IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_movmskps256)
 #define MASK_BITS(condition) __builtin_ia32_movmskps256(real_from_bits(condition))
