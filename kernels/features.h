@@ -1,6 +1,7 @@
 // Lists the kernel features that a scene may need, shared by host and kernels. In kernels each NAME is
-// HAS_NAME, 0 or 1. docs/performance.md has the cost of each where it is not needed. Every primitive of
-// PRIMITIVE_LIST (kernels/types.h) is a feature, so FEATURE takes a name and ignores the rest of its row.
+// HAS_NAME, 0 or 1. build/tools/measure/features measures what each costs a scene that does not need it
+// (docs/performance.md). Every primitive of PRIMITIVE_LIST (kernels/types.h) is a feature, so FEATURE takes a
+// name and ignores the rest of its row.
 #ifndef FEATURES_H
 #define FEATURES_H
 
