@@ -44,7 +44,7 @@ static void print_error(GlintDevice *device, const GlintScene *scene, const doub
     glint_device_info(device, &info);
     if (!info.has_double) return;
     char *messages;
-    double *reference = calloc(VALUES, sizeof *reference);
+    static double reference[VALUES];
     render(device, scene, GLINT_DOUBLE, reference);
     const GlintImagePair images = {.size = sizeof images,
                                    .real = GLINT_FLOAT64,
@@ -56,7 +56,6 @@ static void print_error(GlintDevice *device, const GlintScene *scene, const doub
     GlintImageMetrics metrics = {.size = sizeof metrics};
     check(glint_images_compare(&images, &metrics, &messages), &messages);
     printf("RMSE %.1e, mean FLIP %.1e\n", metrics.rmse, metrics.flip_mean);
-    free(reference);
 }
 
 // Returns the sRGB value of a linear one.
@@ -65,6 +64,18 @@ static unsigned char encode(double light)
     const double clamped = fmin(fmax(light, 0), 1);
     return (unsigned char)lround(
         255 * (clamped <= 0.0031308 ? 12.92 * clamped : 1.055 * pow(clamped, 1 / 2.4) - 0.055));
+}
+
+// Returns 0, or -1 with errno if the file cannot be written.
+static int write_image(const char *path, const double *color)
+{
+    FILE *file = fopen(path, "wb");
+    if (!file) return -1;
+    fprintf(file, "P6 %d %d 255\n", WIDTH, HEIGHT);
+    for (size_t i = 0; i < VALUES && !ferror(file); i++)
+        fputc(encode(color[i]), file);
+    const int failed = ferror(file);
+    return fclose(file) != 0 || failed ? -1 : 0;
 }
 
 int main(int argument_count, char **arguments)
@@ -76,16 +87,13 @@ int main(int argument_count, char **arguments)
     check(glint_device_open(NULL, &device, &messages), &messages);
     check(glint_scene_load(arguments[1], NULL, &scene, &messages), &messages);
 
-    double *color = calloc(VALUES, sizeof *color);
+    static double color[VALUES];
     render(device, scene, GLINT_SINGLE, color);
     print_error(device, scene, color);
-    FILE *file = fopen(arguments[2], "wb");
-    if (!file) return EXIT_FAILURE;
-    fprintf(file, "P6 %d %d 255\n", WIDTH, HEIGHT);
-    for (size_t i = 0; i < VALUES; i++)
-        fputc(encode(color[i]), file);
-    fclose(file);
-    free(color);
+    if (write_image(arguments[2], color) != 0) {
+        perror(arguments[2]);
+        return EXIT_FAILURE;
+    }
 
     GlintTracer *tracer;
     const GlintTraceSettings precision = {.size = sizeof precision, .precision = GLINT_CERTIFIED};

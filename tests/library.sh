@@ -41,4 +41,5 @@ done
 check "both images are the same" cmp shared.ppm static.ppm
 check "the image has its size" test "$(head -c 14 shared.ppm)" = "P6 320 180 255"
 check "a wrong scene ends it with the message" grep -q 'nowhere.yaml.*No such file' <(./shared nowhere.yaml image.ppm 2>&1)
+check "a full disk ends it with the message" grep -q '/dev/full: No space left' <(./shared scene.yaml /dev/full 2>&1)
 finish
