@@ -253,7 +253,7 @@ class View(TestCase):
 
     @staticmethod
     def failing_calls():
-        return shim_build("calls.so", read(ROOT / "tests/shims/calls.c"), "-ldl")
+        return shim_build("view.so", read(ROOT / "tests/shims/view.c"), "-ldl")
 
     def test_unwatched_files(self):
         """If the system can watch no more files, a warning states that changes will not be noticed."""

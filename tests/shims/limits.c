@@ -171,31 +171,31 @@ cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const ch
 
 enum { BUFFERS_MAX = 4096, KERNELS_MAX = 64, ARGUMENTS_MAX = 256 };
 
-// Returns whether the program's compiler or linker is to fail.
-static bool is_too_large(cl_program program, const char *limit, cl_ulong *status)
+// Returns whether the limit makes the program's compiler or linker fail.
+static bool build_is_refused(cl_program program, const char *limit, cl_ulong *status)
 {
     size_t size = 0;
     if (!limit_get(limit, status)) return false;
     NEXT(clGetProgramInfo)(program, CL_PROGRAM_SOURCE, 0, NULL, &size);
     char *text = calloc(size + 1, 1);
     NEXT(clGetProgramInfo)(program, CL_PROGRAM_SOURCE, size, text, NULL);
-    const bool is_too_large = strstr(text, "#define IS_OUT_OF_LINE 0") != NULL;
+    const bool is_inlined = strstr(text, "#define IS_OUT_OF_LINE 0") != NULL;
     free(text);
-    return is_too_large;
+    return is_inlined;
 }
 
 cl_int clBuildProgram(cl_program program, cl_uint count, const cl_device_id *devices, const char *options,
                       void(CL_CALLBACK *notify)(cl_program, void *), void *data)
 {
     cl_ulong status;
-    if (is_too_large(program, "build", &status)) return -(cl_int)status;
+    if (build_is_refused(program, "build", &status)) return -(cl_int)status;
     return NEXT(clBuildProgram)(program, count, devices, options, notify, data);
 }
 
 cl_kernel clCreateKernel(cl_program program, const char *name, cl_int *status)
 {
     cl_ulong failure;
-    if (!is_too_large(program, "kernel", &failure)) return NEXT(clCreateKernel)(program, name, status);
+    if (!build_is_refused(program, "kernel", &failure)) return NEXT(clCreateKernel)(program, name, status);
     *status = -(cl_int)failure;
     return NULL;
 }
@@ -227,7 +227,10 @@ static size_t kernel_find(cl_kernel kernel)
         if (kernels[i].kernel == kernel) return i;
         if (!kernels[i].kernel) place = i;
     }
-    if (place == KERNELS_MAX) abort();
+    if (place == KERNELS_MAX) {
+        fputs("the shim has room for 64 kernels\n", stderr);
+        abort();
+    }
     kernels[place].kernel = kernel;
     return place;
 }
