@@ -1,5 +1,4 @@
 // Fills the AOVs at each pixel's center.
-#include "aovs.h"
 #include "film.h"
 #include "shading/light_visibility.h"
 
@@ -10,12 +9,8 @@ static inline real hit_distance(const Hit *hit)
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
 }
 
-#define LAYER_REAL                                       scalar
-#define LAYER_LENGTH                                     scalar
-#define LAYER_INTEGER                                    int
-#define LAYER_MEMBER(NAME, name, type, components, note) global LAYER_##type *name;
-#define LAYER_POINTER(NAME, name, type, components, note)                                                    \
-    (global LAYER_##type *)(film + (size_t)layers.name * ARENA_UNIT),
+#define LAYER_MEMBER(NAME, name, type, components, note)  global LAYER_##type *name;
+#define LAYER_POINTER(NAME, name, type, components, note) LAYER_AT(film, layers, name, type),
 
 typedef struct {
     HIT_AOV_LIST(LAYER_MEMBER)

@@ -1,5 +1,4 @@
 // Computes the fraction of each pixel that objects cover, and the background's light in the remainder.
-#include "aovs.h"
 #include "film.h"
 #include "shading/sky.h"
 #include "traversal/traversal.h"
@@ -30,8 +29,8 @@ kernel void coverage(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, Laye
                      global int *flags, global const scalar *sample_offsets)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    global scalar *covered = (global scalar *)(film + (size_t)layers.coverage * ARENA_UNIT);
-    global scalar *backdrop = (global scalar *)(film + (size_t)layers.backdrop * ARENA_UNIT);
+    global scalar *covered = LAYER_AT(film, layers, coverage, REAL);
+    global scalar *backdrop = LAYER_AT(film, layers, backdrop, REAL);
     Band band = band_of(band_pixels, 1, flags);
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);

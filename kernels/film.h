@@ -2,6 +2,7 @@
 #ifndef FILM_H
 #define FILM_H
 
+#include "aovs.h"
 #include "camera.h"
 
 typedef struct {
@@ -109,6 +110,13 @@ static inline integer tile_slots(const Tile *tile)
     if (IS_PIXEL_LIST) return tile->slot;
     return integer_of(tile->number * LANES) + LANE_Y * (integer)(TILE_WIDTH) + LANE_X;
 }
+
+// The types of a layer's values (aovs.h), and its address in a band's buffer.
+#define LAYER_REAL    scalar
+#define LAYER_LENGTH  scalar
+#define LAYER_INTEGER int
+#define LAYER_AT(film, layers, name, type)                                                                   \
+    ((global LAYER_##type *)((film) + (size_t)(layers).name * ARENA_UNIT))
 
 // Defines a function that stores one of `stride` values per pixel.
 #define FILM_STORE(name, Stored, Value, ValueLanes)                                                          \

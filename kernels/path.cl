@@ -1,6 +1,5 @@
 // Computes the signature of the ray tree at each pixel's center.
 #define COMPUTE_SIGNATURE 1
-#include "aovs.h"
 #include "film.h"
 #include "shading/path.h"
 
@@ -21,7 +20,7 @@ kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOff
                  global int *flags)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    global int *paths = (global int *)(film + (size_t)layers.path * ARENA_UNIT);
+    global int *paths = LAYER_AT(film, layers, path, INTEGER);
     Band band = band_of(band_pixels, 1, flags);
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
