@@ -134,7 +134,7 @@ static Bounds check_node(const CompiledScene *compiled, size_t index, const Boun
     for (size_t i = 0; i < width; i++) {
         const double *low = node.planes + i, *high = low + BVH_HIGH * width;
         const Bounds stored = {{low[0], low[width], low[2 * width]}, {high[0], high[width], high[2 * width]}};
-        const size_t type = node.child_type[i] & 0xff, count = node.child_type[i] >> 8;
+        const size_t type = leaf_type(node.child_type[i]), count = leaf_count(node.child_type[i]);
         Bounds expected = bounds_empty();
         if (node.child_type[i] == BVH_NODE) expected = check_node(compiled, node.child_index[i], empty);
         size_t first = node.child_index[i];

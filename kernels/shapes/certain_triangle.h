@@ -173,6 +173,12 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     return hit;
 }
 
+// Returns the NEIGHBOR_… bits of the neighbor opposite corner number `corner`.
+static inline integer neighbor_sides(uint4 ids_sides, uint corner)
+{
+    return integer_of(ids_sides.w >> (NEIGHBOR_SIDES_BITS * corner) & NEIGHBOR_SIDES_MASK);
+}
+
 // Returns the lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor or,
 // if lifted, in front of it. So they cannot hit this triangle if it lies behind the neighbor's plane and they
 // leave to its front, nor if they run to the side of this triangle's plane that the neighbor is on, unless
@@ -185,9 +191,9 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
          over_c = lanes & ray_starts_on(ray, ids_sides.z);
     if (!lanes_any(over_a | over_b | over_c)) return mask_none();
     const integer none = (integer)(0);
-    integer sides = lanes_select(over_a, integer_of(ids_sides.w & 15), none);
-    sides = lanes_select(over_b, integer_of(ids_sides.w >> NEIGHBOR_SIDES_BITS & 15), sides);
-    sides = lanes_select(over_c, integer_of(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 15), sides);
+    integer sides = lanes_select(over_a, neighbor_sides(ids_sides, 0), none);
+    sides = lanes_select(over_b, neighbor_sides(ids_sides, 1), sides);
+    sides = lanes_select(over_c, neighbor_sides(ids_sides, 2), sides);
     mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none;
     if (HAS_SMOOTH_NORMALS) {
         mask lifts_away = ray->leaves_outward & ((sides & (integer)(NEIGHBOR_LIFTS_AWAY)) != none);
