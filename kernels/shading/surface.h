@@ -24,7 +24,7 @@ typedef struct {
     Color3 reflection_tint, specular_tint; // with HAS_TINTS
     mask fresnel;                          // with HAS_FRESNEL
     Sample sample;                         // with HAS_AREA_LIGHTS
-    mask conductor;                        // with HAS_CONDUCTORS, and the square of its index:
+    mask conductor;                        // with HAS_CONDUCTORS, like the next two (types.h)
     Color3 conductor_real, conductor_imaginary_squared;
     Color3 transmission_tint; // with HAS_FILTERS
     Color3 absorption;        // with HAS_ABSORPTION: the density within

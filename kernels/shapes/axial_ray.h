@@ -11,7 +11,7 @@ typedef struct {
     Pair moment_on_axis, squared_axis; // E . w; w . w
 } AxialRay;
 
-// Sets the numbers. Oclgrind does not know what clang makes of an inlined function that returns a struct.
+// Fills *axial. Oclgrind rejects the code that clang generates for an inlined function that returns a struct.
 static inline ALWAYS_INLINE void axial_ray_set(AxialRay *axial, uint4 id, Vector foot, Vector axis,
                                                const Ray *ray)
 {

@@ -98,10 +98,10 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, crossing.near, crossing.far);
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);
-    real moved = ray->length, path = moved * fabs(hit.t);
+    real path = ray->length * fabs(hit.t);
     // 3 u of f and the path are needed, and 4 u of the radius, as for a sphere
     real position_error =
-        ray_position_error(ray, path) + moved * (0.5f * (hit.high - hit.low)) +
+        ray_position_error(ray, path) + ray->length * (0.5f * (hit.high - hit.low)) +
         UNIT_ROUNDOFF * (4 * (vector_norm1(f) + path) + 8 * radius + vector_norm1(ray->origin));
     real squared = real_fma(radius, radius, -vector_dot(across, across));
     real band = position_error * (radius + radius + position_error);

@@ -101,7 +101,8 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
 
 // Records crossings in the lanes `found`. Among equally near ones the lowest id counts, so that the image
 // does not depend on the order of objects. Occlusion counts only for active lanes. A closest hit counts for
-// any lane that carries a ray, because it holds outside the group and may be recorded twice.
+// any lane that carries a ray, because it is valid whichever group found it, and recording it
+// twice is harmless.
 static inline void traversal_record(Traversal *traversal, const Scene *scene, mask found, real t, uint id)
 {
     Hit *hit = &traversal->hit;
