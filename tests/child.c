@@ -44,6 +44,13 @@ ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
     return end;
 }
 
+ChildEnd child_run_with_device(void (*work)(void *result), void *result, size_t size)
+{
+    const ChildEnd end = child_run(work, result, size);
+    if (end.status == NO_DEVICE) skip();
+    return end;
+}
+
 unsigned failures_without_memory(void (*work)(void *left))
 {
     long left = 0;

@@ -9,8 +9,13 @@ typedef struct {
     char errors[8192]; // the start of its standard error
 } ChildEnd;
 
+// The status with which the work exits if there is no device.
+enum { NO_DEVICE = 77 };
+
 // Runs `work` on a copy of `result` and copies back what it left there.
 ChildEnd child_run(void (*work)(void *result), void *result, size_t size);
+// Also skips the test if the work exits with NO_DEVICE.
+ChildEnd child_run_with_device(void (*work)(void *result), void *result, size_t size);
 
 // Runs work in children, in which the first allocation fails, then the second, and so on until all succeed,
 // and checks that each failure is reported. Returns the number of failures. `left` is the number of

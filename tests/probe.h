@@ -19,6 +19,17 @@ static Compute probe_compute;
 // The renderers of probe_shared_renderer by precision and lanes.
 static Renderer *probe_renderers[PRECISION_COUNT][LANES_MAX + 1];
 
+// The number of the call of stop_now that stops a render.
+static unsigned stop_countdown;
+
+// A RenderSettings.stop.
+static inline bool stop_now(void *context)
+{
+    (void)context;
+    if (stop_countdown > 0) stop_countdown--;
+    return stop_countdown == 0;
+}
+
 // cmocka's group setup and teardown. The teardown fails if a call of OpenCL failed.
 static inline int probe_open(void **state)
 {

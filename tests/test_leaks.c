@@ -17,7 +17,7 @@ enum { SANITIZED = 0 };
 #endif
 
 typedef enum { NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM } Forgotten;
-enum { NO_DEVICE = 77, LEAKED = 23 };
+enum { LEAKED = 23 };
 
 static void cl_must(cl_int status)
 {

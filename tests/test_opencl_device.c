@@ -184,7 +184,7 @@ static void list_look(void *result)
                         device->same_name_index == same_name_count;
     }
     device_list_close(&list);
-    device_list_close(&list);
+    device_list_close(&list); // a second close does nothing
 }
 
 TEST(list_of_this_machine)

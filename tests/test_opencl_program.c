@@ -21,8 +21,6 @@ typedef struct {
     Compute compute;
 } Opened;
 
-enum { NO_DEVICE = 77 }; // the exit status of a child
-
 static void opened_open(Opened *opened, WarningReceiver *warnings)
 {
     MessageList messages = {0};
@@ -38,7 +36,7 @@ static void opened_close(Opened *opened)
 {
     char *failure = compute_ok(&opened->compute) ? NULL : compute_failure_text(&opened->compute);
     compute_close(&opened->compute);
-    compute_close(&opened->compute);
+    compute_close(&opened->compute); // a second close does nothing
     device_list_close(&opened->list);
     if (failure) fault("%s", failure);
 }
@@ -68,11 +66,11 @@ typedef struct {
     uint64_t text_hash;
     cl_uint values[16];
     size_t compiled_before_launch, compiled_after_launch;
-} Run;
+} TripleRun;
 
 static void run_triple(void *result)
 {
-    Run *run = result;
+    TripleRun *run = result;
     Opened opened;
     opened_open(&opened, NULL);
     Compute *compute = &opened.compute;
@@ -94,22 +92,14 @@ static void run_triple(void *result)
     program_store(compute, &run->request, &program);
     buffer_release(buffer);
     program_close(&program);
-    program_close(&program);
+    program_close(&program); // a second close does nothing
     opened_close(&opened);
 }
 
-// Runs the work in a child, or skips the test if there is no device.
-static ChildEnd child_with_device(void (*work)(void *result), void *result, size_t size)
+static TripleRun run_in_child(ProgramRequest request)
 {
-    const ChildEnd end = child_run(work, result, size);
-    if (end.status == NO_DEVICE) skip();
-    return end;
-}
-
-static Run run_in_child(ProgramRequest request)
-{
-    Run run = {.request = request};
-    ChildEnd end = child_with_device(run_triple, &run, sizeof run);
+    TripleRun run = {.request = request};
+    ChildEnd end = child_run_with_device(run_triple, &run, sizeof run);
     if (end.status != 0) print_error("%s\n", end.errors);
     assert_int_equal(end.status, 0);
     assert_true(run.times_sound);
@@ -134,10 +124,10 @@ static void drivers_own_cache_empty(void)
 
 TEST_WITH(second_build_is_loaded_from_the_cache, scratch_set_up, scratch_tear_down)
 {
-    Run cold = run_in_child(triple_request());
+    TripleRun cold = run_in_child(triple_request());
     assert_false(cold.from_cache);
     drivers_own_cache_empty();
-    Run warm = run_in_child(triple_request());
+    TripleRun warm = run_in_child(triple_request());
     assert_true(warm.from_cache);
     assert_true(warm.text_hash == cold.text_hash);
     // The cache returned machine code for this very launch.
@@ -168,7 +158,7 @@ TEST_WITH(no_cache_builds_each_time, scratch_set_up, scratch_tear_down)
     run_in_child(request);
     request.no_cache = true;
     for (int i = 0; i < 2; i++) {
-        Run run = run_in_child(request);
+        TripleRun run = run_in_child(request);
         assert_false(run.from_cache);
         // PoCL did not find what it had built before.
         if (run.is_pocl) assert_true(run.compiled_after_launch > run.compiled_before_launch);
@@ -257,7 +247,7 @@ static void build_without_kernel_folder(void *result)
 TEST_WITH(missing_kernel_folder_causes_a_warning, scratch_set_up, scratch_tear_down)
 {
     char warning[256] = "";
-    const ChildEnd end = child_with_device(build_without_kernel_folder, warning, sizeof warning);
+    const ChildEnd end = child_run_with_device(build_without_kernel_folder, warning, sizeof warning);
     assert_int_equal(end.status, 0);
     assert_string_equal(end.errors, "");
     static const char start[] = "cannot write 'none/", ending[] = ".log': No such file or directory";
@@ -271,7 +261,7 @@ TEST_WITH(two_processes_build_the_same_program, scratch_set_up, scratch_tear_dow
     for (int i = 0; i < 2; i++) {
         children[i] = fork();
         if (children[i] == 0) {
-            Run run = {.request = triple_request()};
+            TripleRun run = {.request = triple_request()};
             run_triple(&run);
             _exit(run.values[5] == 15 ? 0 : 1);
         }
@@ -301,9 +291,9 @@ static bool names_place(const char *log, const char *place)
 
 TEST_WITH(compile_error_names_its_place_and_the_saved_text, scratch_set_up, scratch_tear_down)
 {
-    Run run = {.request = {.root = "features.h",
-                           .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
-    ChildEnd end = child_with_device(run_triple, &run, sizeof run);
+    TripleRun run = {.request = {.root = "features.h",
+                                 .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
+    ChildEnd end = child_run_with_device(run_triple, &run, sizeof run);
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, "CL_BUILD_PROGRAM_FAILURE"));
     assert_true(names_place(end.errors, "prelude:2"));
@@ -316,8 +306,8 @@ TEST_WITH(compile_error_names_its_place_and_the_saved_text, scratch_set_up, scra
 
 TEST_WITH(missing_root_is_named, scratch_set_up, scratch_tear_down)
 {
-    Run run = {.request = {.root = "absent.cl", .prelude = ""}};
-    ChildEnd end = child_with_device(run_triple, &run, sizeof run);
+    TripleRun run = {.request = {.root = "absent.cl", .prelude = ""}};
+    ChildEnd end = child_run_with_device(run_triple, &run, sizeof run);
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, "absent.cl"));
 }
@@ -355,7 +345,7 @@ static void build_broken(void *result)
 TEST_WITH(compile_error_in_an_included_file_names_its_place, scratch_set_up, scratch_tear_down)
 {
     BuildLog log = {0};
-    assert_int_equal(child_with_device(build_broken, &log, sizeof log).status, 0);
+    assert_int_equal(child_run_with_device(build_broken, &log, sizeof log).status, 0);
     if (!names_place(log.log, "broken.h:4")) print_error("%s\n", log.log);
     assert_true(names_place(log.log, "broken.h:4"));
 }
@@ -371,7 +361,7 @@ static void ask_for_too_much(void *result)
 
 static void use_an_absent_argument(void *result)
 {
-    Run *run = result;
+    TripleRun *run = result;
     Opened opened;
     opened_open(&opened, NULL);
     Program program;
@@ -393,15 +383,15 @@ static void make_empty_buffers(void *result)
 
 TEST_WITH(failed_calls_are_named, scratch_set_up, scratch_tear_down)
 {
-    Run run = {.request = triple_request()};
-    ChildEnd end = child_with_device(ask_for_too_much, &run, sizeof run);
+    TripleRun run = {.request = triple_request()};
+    ChildEnd end = child_run_with_device(ask_for_too_much, &run, sizeof run);
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, " requested; the device has "));
-    end = child_with_device(use_an_absent_argument, &run, sizeof run);
+    end = child_run_with_device(use_an_absent_argument, &run, sizeof run);
     assert_int_equal(end.status, 2);
     assert_non_null(strstr(end.errors, "argument 7 of triple"));
     assert_non_null(strstr(end.errors, "CL_INVALID_ARG_INDEX"));
-    assert_int_equal(child_with_device(make_empty_buffers, &run, sizeof run).status, 0);
+    assert_int_equal(child_run_with_device(make_empty_buffers, &run, sizeof run).status, 0);
 }
 
 TEST_MAIN(NULL, NULL)

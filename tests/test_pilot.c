@@ -206,15 +206,6 @@ TEST(pilot_chooses)
     assert_int_equal(messages.count, 0);
 }
 
-static unsigned stop_countdown;
-
-static bool stop_now(void *context)
-{
-    (void)context;
-    if (stop_countdown > 0) stop_countdown--;
-    return stop_countdown == 0;
-}
-
 // Float precisions warn of these sizes. A warning does not hide that a sample was stopped.
 TEST(pilot_stops)
 {

@@ -94,14 +94,6 @@ TEST(replayed_decisions_change_nothing)
     }
 }
 
-static unsigned stop_countdown;
-
-static bool stop_now(void *context)
-{
-    (void)context;
-    return stop_countdown-- == 0;
-}
-
 TEST(rounds_stop)
 {
     OwnedScene scene = scene_of_file("scenes/globe.yaml");
@@ -112,7 +104,7 @@ TEST(rounds_stop)
     Renderer *renderer = probe_renderer(&scene, &settings);
     for (unsigned launches = 0; launches < 9; launches++) {
         Received received = {.film = film_allocate(WIDTH, HEIGHT, (uint32_t)scene.lights.count, AOVS)};
-        stop_countdown = launches;
+        stop_countdown = launches + 1;
         assert_false(renderer_accumulate(renderer, AOVS, band_receive, &received));
         // the band of the launch after which it stops is not delivered
         if (launches < 5) assert_int_equal(received.color_bands, launches);
