@@ -40,10 +40,10 @@ static RandomRay torus_ray(const RandomShape *shape, Random *random)
     case 1:
         return ray_between(in_hole, vector_add(in_hole, random_in_sphere(random)), random);
     case 2: {
-        // Seen along the plane the outline is the same whatever the height.
-        Vector3 beside = vector_scale(other, shape->radius * random_between(random, -1.1, 1.1));
+        // A ray in the circle's plane sees the torus edge-on.
+        Vector3 target = vector_scale(other, shape->radius * random_between(random, -1.1, 1.1));
         return ray_between(vector_add(shape->center, vector_scale(in_plane, distance)),
-                           vector_add(shape->center, beside), random);
+                           vector_add(shape->center, target), random);
     }
     default:
         return ray_between(vector_add(on_circle, vector_scale(random_unit_vector(random), distance)),
