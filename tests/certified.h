@@ -13,7 +13,7 @@ enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG };
 typedef struct {
     size_t wrong, wrong_decided; // pixels; the latter are not listed as uncertified
     uint64_t rerendered, uncertified;
-} Answer;
+} DecisionCounts;
 
 static inline Film image_render(const Scene *scene, const RenderSettings *settings)
 {
@@ -22,13 +22,13 @@ static inline Film image_render(const Scene *scene, const RenderSettings *settin
     return film;
 }
 
-static inline Answer answer(const Scene *scene, const CertifySample *reference,
-                            const RenderSettings *settings)
+static inline DecisionCounts decisions_count(const Scene *scene, const CertifySample *reference,
+                                             const RenderSettings *settings)
 {
     OwnedFilm film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(reference, &film);
-    const Answer counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
-                            film.rerenders.rerendered, film.rerenders.uncertified};
+    const DecisionCounts counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
+                                    film.rerenders.rerendered, film.rerenders.uncertified};
     return counted;
 }
 

@@ -364,13 +364,13 @@ static void check_family(Family family)
         settings.bounce_count = bounce_counts[family];
         OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
-        single_wrong += answer(&scene, &reference, &settings).wrong;
+        single_wrong += decisions_count(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
         if (!tests_are_long()) settings.extra_features = film_features(PRECISION_CERTIFIED);
         for (unsigned run = 0; run < run_count; run++) {
             settings.bvh = run == 1 ? BVH_OFF : BVH_ON;
             settings.perturb_seed = run == 2 ? 1 + seed % PERTURB_SEEDS : 0;
-            const Answer certified = answer(&scene, &reference, &settings);
+            const DecisionCounts certified = decisions_count(&scene, &reference, &settings);
             if (certified.wrong_decided > 0)
                 fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not uncertified",
                          family_names[family], seed, run, certified.wrong, certified.wrong_decided);
@@ -508,10 +508,10 @@ TEST(terminators_of_ovals_are_decided)
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
         OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
-        single_wrong += answer(&scene, &reference, &settings).wrong;
+        single_wrong += decisions_count(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
         settings.extra_features = CERTIFIED_FEATURES;
-        const Answer certified = answer(&scene, &reference, &settings);
+        const DecisionCounts certified = decisions_count(&scene, &reference, &settings);
         if (certified.wrong_decided > 0)
             fail_msg("scene %u: %zu pixels are wrong, %zu of them not uncertified", seed, certified.wrong,
                      certified.wrong_decided);
@@ -535,7 +535,7 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     assert_true(certify_sample_open(&reference, scene, settings, 400));
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
-    const Answer found = answer(scene, &reference, &certified);
+    const DecisionCounts found = decisions_count(scene, &reference, &certified);
     if (found.wrong_decided > 0)
         print_message("image %zu: %zu of %zu wrong, %zu of them not uncertified\n", pictures->images,
                       found.wrong, reference.count, found.wrong_decided);

@@ -129,7 +129,7 @@ TEST(thin_walls_are_decided)
         assert_true(certify_sample_open(&reference, &scene, &settings, SMALL_SIDE * SMALL_SIDE));
         const Precision last = tests_are_long() ? PRECISION_STRICT : PRECISION_SINGLE;
         for (; settings.precision <= last; settings.precision++) {
-            const Answer found = answer(&scene, &reference, &settings);
+            const DecisionCounts found = decisions_count(&scene, &reference, &settings);
             assert_int_equal(found.wrong == 0, i == 0);
         }
         assert_true(check_small(&scene, 6, "a bubble with a thin wall", wall) < SMALL_SIDE);
@@ -228,7 +228,7 @@ TEST(slim_triangles_are_seldom_rerendered)
         settings.bounce_count = 2;
         OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, SIDE * SIDE));
-        const Answer found = answer(&scene, &reference, &settings);
+        const DecisionCounts found = decisions_count(&scene, &reference, &settings);
         print_message("%zu of %u samples re-rendered\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);
         assert_true(found.rerendered < 64);

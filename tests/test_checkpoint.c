@@ -364,11 +364,11 @@ TEST(a_file_removed_before_the_lock)
 typedef struct {
     uint32_t rows, rendered;
     bool is_right;
-} Sink;
+} ResumedRows;
 
 static bool band_sink(void *context, const Film *band)
 {
-    Sink *sink = context;
+    ResumedRows *sink = context;
     const float *color = band->layers[LAYER_COLOR];
     sink->is_right = sink->is_right && band->first_row == sink->rows;
     for (uint32_t i = 0; i < COLOR_VALUES; i++)
@@ -391,7 +391,7 @@ TEST(a_render_resumes)
             }
         close_checked(checkpoint, false);
         checkpoint = open_checked();
-        Sink sink = {.is_right = true};
+        ResumedRows sink = {.is_right = true};
         Scheduler *scheduler = scheduler_open(&(SchedulerSettings){.row_count = ROWS,
                                                                    .worker_count = 1,
                                                                    .sink = band_sink,

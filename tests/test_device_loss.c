@@ -37,11 +37,11 @@ static void pair_dropped(void *context, size_t index)
 }
 
 // Returns whether the image is whole. The computes are left open.
-static bool pair_work(Compute computes[2], Answer *answer)
+static bool pair_work(Compute computes[2], WorkResult *result)
 {
     call_counts_clear();
     memset(&pair, 0, sizeof pair);
-    memset(answer, 0, sizeof *answer);
+    memset(result, 0, sizeof *result);
     sem_init(&pair.first_continues, 0, 0);
     sem_init(&pair.second_continues, 0, 0);
     Renderer *renderers[2];
@@ -55,7 +55,7 @@ static bool pair_work(Compute computes[2], Answer *answer)
                            .aovs = AOVS_ALL,
                            .sink = work_receive_band,
                            .dropped = pair_dropped,
-                           .context = answer};
+                           .context = result};
     bool whole = render_job_run(&job);
     work_settings.stop = NULL;
     for (size_t i = 0; i < 2; i++)
@@ -78,13 +78,13 @@ TEST(one_of_two_devices)
         "clCreateBuffer",     "clSetKernelArg", "clEnqueueWriteBuffer",   "clEnqueueReadBuffer",
         "clEnqueueMapBuffer", "clGetEventInfo", "clEnqueueNDRangeKernel", "clWaitForEvents"};
     Compute computes[2];
-    Answer answer;
+    WorkResult result;
     injected.in_threads = true;
     injected.call = NULL;
     injected.returns_null = false;
-    assert_true(pair_work(computes, &answer));
+    assert_true(pair_work(computes, &result));
     assert_int_equal(pair.dropped_count, 0);
-    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    assert_memory_equal(result.colors, right.colors, sizeof right.colors);
     pair_close(computes);
     CallCount all[CALL_COUNTS];
     memcpy(all, call_counts, sizeof all);
@@ -95,12 +95,12 @@ TEST(one_of_two_devices)
         assert_true(count > 0);
         for (injected.index = 0; injected.index < count; injected.index++) {
             injected.call = needed[i];
-            bool whole = pair_work(computes, &answer);
+            bool whole = pair_work(computes, &result);
             if (!whole) fail_msg("%s, call %zu: no image", needed[i], injected.index);
             assert_int_equal(pair.dropped_count, 1);
             assert_int_equal(pair.dropped, 1);
-            assert_int_equal(answer.band_count, 2);
-            assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+            assert_int_equal(result.band_count, 2);
+            assert_memory_equal(result.colors, right.colors, sizeof right.colors);
             assert_true(compute_ok(&computes[0]));
             assert_string_equal(computes[1].failure.call, needed[i]);
             pair_close(computes);
@@ -114,14 +114,14 @@ TEST(one_of_two_devices)
 TEST(a_device_without_a_thread)
 {
     Compute computes[2];
-    Answer answer;
+    WorkResult result;
     injected.call = "pthread_create";
     injected.index = EVERY_CALL;
-    assert_true(pair_work(computes, &answer));
+    assert_true(pair_work(computes, &result));
     injected.call = NULL;
     assert_int_equal(pair.dropped_count, 1);
     assert_int_equal(pair.dropped, 1);
-    assert_memory_equal(answer.colors, right.colors, sizeof right.colors);
+    assert_memory_equal(result.colors, right.colors, sizeof right.colors);
     assert_true(compute_ok(&computes[0]));
     assert_string_equal(computes[1].failure.call, "pthread_create");
     pair_close(computes);
@@ -130,13 +130,13 @@ TEST(a_device_without_a_thread)
 TEST(both_of_two_devices)
 {
     Compute computes[2];
-    Answer answer;
+    WorkResult result;
     injected.call = "clEnqueueNDRangeKernel";
     injected.index = EVERY_CALL;
-    assert_false(pair_work(computes, &answer));
+    assert_false(pair_work(computes, &result));
     assert_int_equal(pair.dropped_count, 1); // the last one reports for all
     assert_false(compute_ok(&computes[0]) || compute_ok(&computes[1]));
-    assert_int_equal(answer.band_count, 0);
+    assert_int_equal(result.band_count, 0);
     pair_close(computes);
     injected.call = NULL;
 }

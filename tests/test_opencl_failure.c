@@ -15,11 +15,11 @@ static void call_fail(const char *call, size_t index, bool returns_null, bool is
     injected.returns_null = returns_null;
     call_counts_clear();
     Compute compute;
-    Answer answer;
-    bool done = work(&compute, &answer);
+    WorkResult result;
+    bool done = work(&compute, &result);
     if (done == is_needed) fail_msg("%s, call %zu: %s", call, index, done ? "not reported" : "reported");
     if (done) {
-        assert_memory_equal(&answer, &right, sizeof answer);
+        assert_memory_equal(&result, &right, sizeof result);
     } else {
         assert_string_equal(compute.failure.call, call);
         OWNED char *text = compute_failure_text(&compute);
@@ -101,8 +101,8 @@ TEST(empty_build_log)
         injected.call = "clBuildProgram";
         injected.index = EVERY_CALL;
         Compute compute;
-        Answer answer;
-        assert_false(work(&compute, &answer));
+        WorkResult result;
+        assert_false(work(&compute, &result));
         OWNED char *text = compute_failure_text(&compute);
         assert_non_null(strstr(text, "the driver gives no build log"));
         assert_int_equal(strstr(text, "is full (12 KiB free)") != NULL, full);
@@ -181,8 +181,8 @@ TEST(unknown_memory)
     injected.index = 0;
     call_counts_clear();
     Compute compute;
-    Answer answer;
-    assert_false(work(&compute, &answer));
+    WorkResult result;
+    assert_false(work(&compute, &result));
     OWNED char *text = compute_failure_text(&compute);
     assert_non_null(strstr(text, "the device does not report its memory"));
     assert_null(strstr(text, "the device has 0"));

@@ -11,14 +11,14 @@ enum { LARGE_BYTES = 4 << 20 };
 static DeviceList devices;
 const Device *work_device;
 Scene work_scene;
-Answer right;
+WorkResult right;
 
 bool work_receive_band(void *context, const Film *band)
 {
-    Answer *answer = context;
-    memcpy(answer->colors + (size_t)band->first_row * SIDE * 3, band->layers[LAYER_COLOR],
-           (size_t)band->height * SIDE * 3 * sizeof *answer->colors);
-    answer->band_count++;
+    WorkResult *result = context;
+    memcpy(result->colors + (size_t)band->first_row * SIDE * 3, band->layers[LAYER_COLOR],
+           (size_t)band->height * SIDE * 3 * sizeof *result->colors);
+    result->band_count++;
     return true;
 }
 
@@ -33,19 +33,19 @@ RenderSettings work_settings = {.width = SIDE,
                                 .shift_to_eye = true,
                                 .band_rows = BAND_ROWS};
 
-bool work(Compute *compute, Answer *answer)
+bool work(Compute *compute, WorkResult *result)
 {
     static const TraceRay rays[RAY_COUNT] = {{{0, 0, 5}, {0, 0, -1}, 0, 100},
                                              {{0, 3, 5}, {0, 0, -1}, 0, 100},
                                              {{1, 1, 5}, {0, -0.25, -1}, 0, 100}};
     MessageList messages = {0};
-    memset(answer, 0, sizeof *answer);
+    memset(result, 0, sizeof *result);
     compute_open(compute, work_device);
     cl_mem large = buffer_adopt(compute, LARGE_BYTES, memory_allocate_large(LARGE_BYTES, 1));
     Renderer *renderer = renderer_open(compute, &work_scene, &work_settings, &messages);
-    bool done = renderer && renderer_render(renderer, AOVS_ALL, work_receive_band, answer) &&
-                renderer_trace(renderer, rays, RAY_COUNT, answer->hits);
-    if (renderer) memcpy(answer->ray_counts, renderer_report(renderer)->rays, sizeof answer->ray_counts);
+    bool done = renderer && renderer_render(renderer, AOVS_ALL, work_receive_band, result) &&
+                renderer_trace(renderer, rays, RAY_COUNT, result->hits);
+    if (renderer) memcpy(result->ray_counts, renderer_report(renderer)->rays, sizeof result->ray_counts);
     renderer_close(renderer);
     buffer_release(large);
     assert_int_equal(messages.count, 0); // the user made no mistake
@@ -65,10 +65,10 @@ void assert_work_is_right(void)
     injected.call = NULL;
     call_counts_clear();
     Compute compute;
-    Answer answer;
-    assert_true(work(&compute, &answer));
+    WorkResult result;
+    assert_true(work(&compute, &result));
     compute_close_checked(&compute);
-    assert_memory_equal(&answer, &right, sizeof answer);
+    assert_memory_equal(&result, &right, sizeof result);
 }
 
 int work_set_up(void **state)
