@@ -397,6 +397,12 @@ TEST(materials_may_follow_objects)
     assert_number(scene.materials.items[scene.objects.items[0].material].shininess, 7);
 }
 
+TEST(the_largest_frame_rate_is_allowed)
+{
+    OwnedScene scene = scene_of_text("s.yaml", LIT SPHERE "fps: 1000\n");
+    assert_number(scene.animation.frame_rate, 1000);
+}
+
 TEST(warnings)
 {
     assert_messages("s.yaml", LIT SPHERE, "");
