@@ -2,6 +2,7 @@
 //
 // run_tests: sanitize-long-only
 #include "host/compile/instances.h"
+#include "host/compile/stages.h"
 #include "host/render/render_job.h"
 #include "tests/check.h"
 #include "tests/files.h"
@@ -411,12 +412,27 @@ TEST(too_many_are_refused)
     settings.certifies = true;
     check_message(
         &scene, &settings,
-        "error: copies of meshes for instances have 16777728 triangles, more than 16777216: precision "
-        "certified copies all, other precisions those that a transform stretches unevenly\n");
+        "error: unshared instances have 16777728 triangles in total; at most 16777216 are allowed: precision "
+        "certified shares no meshes, other precisions none that a transform stretches unevenly\n");
     object_repeat(&scene, (INT32_MAX - 1) / TRIANGLES - scene.objects.count + 2);
     settings.certifies = false;
     check_message(&scene, &settings,
                   "error: the scene has 2147484673 objects and triangles with IDs, more than 2147483646\n");
+}
+
+// Counts only: the mesh does not have these triangles.
+TEST(one_instance_of_a_large_mesh_is_not_a_copy)
+{
+    OwnedScene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
+    Mesh *mesh = &scene.meshes.items[scene.objects.items[1].as.mesh.index];
+    const size_t count = mesh->triangle_count;
+    const CompiledScene compiled = {0};
+    OwnedMessageList messages = {0};
+    mesh->triangle_count = (1 << 24) + 1;
+    assert_true(size_fits(&compiled, &scene, &messages));
+    object_repeat(&scene, 1);
+    assert_false(size_fits(&compiled, &scene, &messages));
+    mesh->triangle_count = count;
 }
 
 // 10,000 instances of 20,000 triangles need the arrays of one mesh and of the instances.

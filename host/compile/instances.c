@@ -139,9 +139,17 @@ static uint32_t shared_mesh_index(InstancePlan *plan, uint32_t *first, const Sha
     return (uint32_t)plan->mesh_count;
 }
 
-static bool is_instance(const Object *object)
+bool object_is_instance(const Object *object)
 {
     return object->type == SHAPE_MESH && object->as.mesh.is_instance;
+}
+
+uint32_t *instance_uses(const Scene *scene)
+{
+    uint32_t *uses = memory_allocate_zeroed(scene->meshes.count, sizeof *uses);
+    for (size_t i = 0; i < scene->objects.count; i++)
+        if (object_is_instance(&scene->objects.items[i])) uses[scene->objects.items[i].as.mesh.index]++;
+    return uses;
 }
 
 // Returns whether meshes are shared where that suits them.
@@ -150,7 +158,7 @@ static bool sharing_is_wanted(const Scene *scene, const CompileSettings *setting
     size_t count = 0;
     if (settings->certifies || settings->instances == INSTANCES_COPIED) return false;
     for (size_t i = 0; i < scene->objects.count; i++)
-        if (is_instance(&scene->objects.items[i]))
+        if (object_is_instance(&scene->objects.items[i]))
             count += object_primitive_count(scene, &scene->objects.items[i]);
     return count > (settings->instances == INSTANCES_SHARED ? 0 : COPIED_TRIANGLES_MAX);
 }
@@ -161,12 +169,10 @@ InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings
     InstancePlan *plan = memory_allocate_zeroed(1, sizeof *plan);
     plan->of_objects = memory_allocate_zeroed(scene->objects.count, sizeof *plan->of_objects);
     uint32_t *first = memory_allocate_zeroed(scene->meshes.count, sizeof *first),
-             *uses = memory_allocate_zeroed(scene->meshes.count, sizeof *uses);
-    for (size_t i = 0; i < scene->objects.count; i++)
-        if (is_instance(&scene->objects.items[i])) uses[scene->objects.items[i].as.mesh.index]++;
+             *uses = instance_uses(scene);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (!is_instance(object) || object_primitive_count(scene, object) == 0) continue;
+        if (!object_is_instance(object) || object_primitive_count(scene, object) == 0) continue;
         if (uses[object->as.mesh.index] == 1 && settings->instances != INSTANCES_SHARED) continue;
         const SharedMeshPlan wanted = shared_mesh_of(scene, object);
         if (!map_suits(scene, object, &wanted, &plan->condition)) continue;

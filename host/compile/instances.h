@@ -43,6 +43,10 @@ double map_condition(const InstanceMap *map);
 void map_round(const Rounding *rounding, const InstanceMap *map, const double place[3], scalar4 rows[3],
                scalar4 inverses[3]);
 
+bool object_is_instance(const Object *object);
+// Returns the number of instances of each of the scene's meshes. The caller frees it.
+uint32_t *instance_uses(const Scene *scene);
+
 // Returns a plan of which objects share meshes, or NULL if none does.
 InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings);
 void instance_plan_free(InstancePlan *plan);

@@ -13,7 +13,7 @@
 bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
     const size_t id_max = INT32_MAX - 1, largest = (size_t)1 << 28; // bits that the BVH counts with
-    const size_t copied_max = (size_t)1 << 24;                      // bounds the cost of a hostile file
+    const size_t unshared_max = (size_t)1 << 24;                    // bounds the cost of a hostile file
     const InstancePlan *plan = compiled->instances;
     const size_t count = scene_primitive_count(scene), single = count - (plan ? plan->triangle_count : 0);
     if (count > id_max)
@@ -22,18 +22,20 @@ bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *m
     if (single > largest)
         return message_error(messages, "the scene has %zu objects and triangles, more than %zu", single,
                              largest);
-    size_t copied = 0;
+    size_t unshared = 0;
+    uint32_t *uses = instance_uses(scene);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (object->type == SHAPE_MESH && object->as.mesh.is_instance && instance_mesh(compiled, i) == 0)
-            copied += object_primitive_count(scene, object);
+        if (object_is_instance(object) && uses[object->as.mesh.index] > 1 && instance_mesh(compiled, i) == 0)
+            unshared += object_primitive_count(scene, object);
     }
-    if (copied <= copied_max) return true;
+    free(uses);
+    if (unshared <= unshared_max) return true;
     return message_error(
         messages,
-        "copies of meshes for instances have %zu triangles, more than %zu: precision certified "
-        "copies all, other precisions those that a transform stretches unevenly",
-        copied, copied_max);
+        "unshared instances have %zu triangles in total; at most %zu are allowed: precision certified shares "
+        "no meshes, other precisions none that a transform stretches unevenly",
+        unshared, unshared_max);
 }
 
 typedef struct {
