@@ -1,5 +1,6 @@
 // Tests the composed kernel text, its hash, whether event times are trusted, and work-groups cut to fit, all
 // without a device.
+#include "host/opencl/capture.h"
 #include "host/opencl/compose.h"
 #include "tests/check.h"
 #include "tests/child.h"
@@ -90,6 +91,21 @@ TEST(work_groups_fit)
         assert_int_equal(sides[0], cases[i].fit[0]);
         assert_int_equal(sides[1], cases[i].fit[1]);
     }
+}
+
+// A kernel may have the address of a released one whose argument had another type.
+TEST(captured_arguments_are_replaced)
+{
+    OWNED char *kernel = malloc(1);
+    const int number = 7;
+    cl_mem buffer = NULL;
+    Compute compute = {0};
+    capture_argument(&compute, (cl_kernel)kernel, 3, false, sizeof number, &number);
+    capture_argument(&compute, (cl_kernel)kernel, 3, true, sizeof buffer, &buffer);
+    assert_int_equal(compute.captured.count, 1);
+    assert_true(compute.captured.items[0].is_buffer);
+    assert_int_equal(compute.captured.items[0].value.count, sizeof buffer);
+    capture_close(&compute);
 }
 
 TEST_MAIN(NULL, NULL)

@@ -14,14 +14,16 @@
 void capture_argument(Compute *compute, cl_kernel kernel, cl_uint index, bool is_buffer, size_t size,
                       const void *value)
 {
-    const CapturedArgument unset = {.kernel = kernel, .index = index, .is_buffer = is_buffer};
+    const CapturedArgument unset = {.kernel = kernel, .index = index};
     size_t i = 0;
     while (i < compute->captured.count &&
            (compute->captured.items[i].kernel != kernel || compute->captured.items[i].index != index))
         i++;
     if (i == compute->captured.count) array_push(compute->captured, unset);
-    text_free(&compute->captured.items[i].value);
-    text_append(&compute->captured.items[i].value, value, size);
+    CapturedArgument *argument = &compute->captured.items[i];
+    argument->is_buffer = is_buffer; // a released kernel may have had this one's address
+    text_free(&argument->value);
+    text_append(&argument->value, value, size);
 }
 
 void capture_close(Compute *compute)
@@ -109,7 +111,7 @@ void capture_launch(Compute *compute, const Launch *launch)
     sizes_write(json, "items", launch->dimensions, launch->items);
     sizes_write(json, "group", launch->dimensions, launch->group);
     json_begin_array(json, "arguments");
-    // a released kernel may have had this one's address, and more arguments
+    // such a released kernel may have had more arguments
     cl_uint argument_count = 0;
     is_written =
         is_written && compute_try(compute, clGetKernelInfo(launch->kernel, CL_KERNEL_NUM_ARGS,
