@@ -162,6 +162,7 @@ class Test(TestCase):
             (("buffers", 0, "uri"), "unreadable.bin", r"buffers\[0\].uri: cannot read 'unreadable.bin': Input/output error"),
             (("bufferViews",), [], r"bufferView: the file has no 'bufferViews'"),
             (("nodes",), {}, "nodes: must be an array"),
+            ((*node, "mesh"), 1e300, r"nodes\[0\].mesh: must be an integer from 0 to 0"),
             (("scenes", 0, "nodes"), {}, r"scenes\[0\].nodes: must be an array"),
             ((*node, "children"), 1, r"nodes\[0\].children: must be an array"),
             (("meshes", 0, "primitives"), {}, r"meshes\[0\].primitives: must be an array"),

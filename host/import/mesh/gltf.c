@@ -89,9 +89,10 @@ static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t hi
     // writers of floating-point numbers add a fraction of 0
     const double real = json_number_value(item->json);
     const bool is_whole = json_is_integer(item->json) || (fabs(real) <= 0x1p53 && real == floor(real));
-    const json_int_t number = json_is_integer(item->json) ? json_integer_value(item->json) : (json_int_t)real;
-    if (!json_is_number(item->json) || !is_whole || number < 0 || (uint64_t)number < low ||
-        (uint64_t)number > high)
+    const json_int_t number = json_is_integer(item->json) ? json_integer_value(item->json)
+                              : is_whole                  ? (json_int_t)real
+                                                          : -1;
+    if (!json_is_number(item->json) || number < 0 || (uint64_t)number < low || (uint64_t)number > high)
         return gltf_fails(gltf, item, "must be an integer from %zu to %zu", low, high);
     *value = (size_t)number;
     return true;
