@@ -3,7 +3,9 @@
 #include "host/image/flip.h"
 #include "host/image/heatmap.h"
 #include "host/image/image_metrics.h"
+#include "host/image/srgb.h"
 #include "tests/check.h"
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 
 enum { SIDE = 64 };
@@ -166,4 +168,23 @@ TEST(heatmap_rises)
     assert_near((double)color[0] + (double)color[1] + (double)color[2], 3, 1e-6);
 }
 
-TEST_MAIN(NULL, NULL)
+TEST(heatmaps_look_alike_in_every_format)
+{
+    static const char *const paths[] = {"map.png", "map.exr", "map.npy"};
+    const float errors[] = {1, 0.1F, 0.01F, INFINITY};
+    float expected[COUNT_OF(errors)][3];
+    for (size_t i = 0; i < COUNT_OF(paths); i++) {
+        OwnedMessageList messages = {0};
+        OwnedImage image;
+        assert_true(heatmap_write(paths[i], errors, COUNT_OF(errors), 1, 1, &messages));
+        assert_true(image_read(&image, paths[i], NULL, &messages));
+        for (size_t k = 0; k < COUNT_OF(errors); k++) {
+            float color[3];
+            image_light(&image, k, image.display, i == 0 ? expected[k] : color);
+            for (int channel = 0; i > 0 && channel < 3; channel++)
+                assert_float_equal(color[channel], expected[k][channel], 0.005F);
+        }
+    }
+}
+
+TEST_MAIN(folder_open, folder_close)
