@@ -248,6 +248,7 @@ class Test(TestCase):
             ({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}, "samplers[0].magFilter", "filtering by the nearest texel is not used"),
             ({"pbrMetallicRoughness": image | {"roughnessFactor": 0}}, "materials[0]", "reflections of metals do not have the colors of a texture"),
             ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}, "pbrMetallicRoughness": image | {"metallicFactor": 0}}, "materials[0]", "transmitted light does not have the colors of a texture"),
+            ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}, "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 0}}, "materials[0]", "a material that is transparent by its alpha transmits no other light"),
             ({"pbrMetallicRoughness": image, "normalTexture": {"index": 0, "texCoord": 1}}, "materials[0].normalTexture", "the normal texture has other coordinates than the color"),
             ({"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": image | {"baseColorFactor": [1, 0, 0, 1]}}, "materials[0]", "the factors of an emitted texture become their mean"),
         ):

@@ -274,6 +274,8 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
     if (opacity < 1) {
         material_set_opacity(look, opacity);
         material->textured_ambient *= opacity;
+        if (transmission > 0)
+            gltf_lose(gltf, item, "a material that is transparent by its alpha transmits no other light");
     } else if (transmission > 0) {
         const Material opaque = *look;
         material_set_opacity(look, 1 - transmission);
