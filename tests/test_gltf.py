@@ -358,17 +358,19 @@ class Test(TestCase):
     def test_lights_and_cameras(self):
         gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [
             {"type": "directional"}, {"type": "point", "intensity": 1000, "color": [1, 0.5, 0]}, {"type": "spot", "spot": {"outerConeAngle": 0.5}},
-            {"type": "area"},
+            {"type": "area"}, {"type": "point", "intensity": -1}, {"type": "point", "color": [1, -1, 1]},
         ]}})  # fmt: skip
         gltf.square()
-        for i in range(5):
+        for i in range(7):
             gltf.place(translation=[0, 0, 3], extensions={"KHR_lights_punctual": {"light": i}})
         gltf.place(camera=gltf.add("cameras", type="orthographic", orthographic={"xmag": 1, "ymag": 1}))
         gltf.place(camera=gltf.add("cameras", type="perspective", perspective={"yfov": 1}))
         report = self.checked(
             gltf.write("a.gltf"),
             "extensions.KHR_lights_punctual.lights[3].type: must be directional, point or spot: not used",
-            "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
+            "extensions.KHR_lights_punctual.lights[4].intensity: must be 0 or more, not -1: not used",
+            "extensions.KHR_lights_punctual.lights[5].color: must be 0 or more, not -1: not used",
+            "nodes[7].extensions.KHR_lights_punctual.light: must be an integer from 0 to 5: not used",
             "cameras[1]: only the first camera is used",
             "lights of 33.9 in total around the center",
         )

@@ -214,6 +214,16 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
     gltf->is_optional = false;
 }
 
+// Returns false with a warning if a member of an optional item has a number below 0.
+static bool not_negative(Gltf *gltf, const GltfItem *item, const char *key, size_t count,
+                         const double *values)
+{
+    const GltfItem member = gltf_member(item, key);
+    for (size_t i = 0; i < count; i++)
+        if (values[i] < 0) return gltf_fails(gltf, &member, "must be 0 or more, not %g", values[i]);
+    return true;
+}
+
 static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
 {
     const GltfItem type = gltf_member(light, "type"), cone = gltf_member(light, "spot");
@@ -225,22 +235,23 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
         gltf_fails(gltf, &type, "must be directional, point or spot");
     else if (gltf_numbers(gltf, light, "color", 3, color) &&
              gltf_numbers(gltf, light, "intensity", 1, &intensity) &&
+             not_negative(gltf, light, "color", 3, color) &&
+             not_negative(gltf, light, "intensity", 1, &intensity) &&
              gltf_numbers(gltf, &cone, "innerConeAngle", 1, &inner) &&
              gltf_numbers(gltf, &cone, "outerConeAngle", 1, &outer)) {
         outer = fmin(fmax(outer, 1e-3), M_PI / 2);
         inner = fmin(fmax(inner, 0), outer);
         // a white surface reflects 1 / pi of the illuminance
-        const double part = fmax(intensity, 0) / M_PI;
-        const Light added = {
-            .type = is_sun    ? LIGHT_DIRECTIONAL
-                    : is_spot ? LIGHT_SPOT
-                              : LIGHT_POINT,
-            .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},
-            .position = affine_point(affine, (Vector3){0, 0, 0}),
-            .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
-            .spot.half_angle = outer * (180 / M_PI),
-            .spot.penumbra = (outer - inner) * (180 / M_PI),
-            .fading = {0, 0, 1}};
+        const double part = intensity / M_PI;
+        const Light added = {.type = is_sun    ? LIGHT_DIRECTIONAL
+                                     : is_spot ? LIGHT_SPOT
+                                               : LIGHT_POINT,
+                             .color = {color[0] * part, color[1] * part, color[2] * part},
+                             .position = affine_point(affine, (Vector3){0, 0, 0}),
+                             .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
+                             .spot.half_angle = outer * (180 / M_PI),
+                             .spot.penumbra = (outer - inner) * (180 / M_PI),
+                             .fading = {0, 0, 1}};
         array_push(gltf->draft->import->view->lights, added);
     }
     gltf->is_optional = false;
