@@ -153,7 +153,8 @@ static const Field paraboloid_fields[] = {
 static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
 {
     object->as.paraboloid.finite = object->as.paraboloid.height > 0;
-    object->as.paraboloid.caps &= object->as.paraboloid.finite;
+    if (!object->as.paraboloid.finite && field_node(reader, mapping, "caps") != mapping)
+        return field_fails(reader, mapping, "caps", "'caps' needs a 'height'");
     if (form == FORM_FOCAL_LENGTH) return true;
     if (!object->as.paraboloid.finite)
         return report_error(&reader->report, mapping->offset,
