@@ -252,6 +252,34 @@ TEST(parts_are_layers)
     check_refused(NULL, "several layers, beauty, other; name one");
 }
 
+TEST(a_layer_precedes_a_part_of_its_name)
+{
+    exr_write("diffuse:AO,diffuse.B,diffuse.G,diffuse.R,mask", plain);
+    check_values("diffuse", "321", "a layer in a part of its name");
+    exr_write("diffuse:AO,diffuse.B,diffuse.G,diffuse.R", plain);
+    check_values("diffuse", "321", "a layer next to one channel in a part of its name");
+}
+
+TEST(layers_are_bounded)
+{
+    enum { LAYERS_MAX = 4096 };
+    for (int count = LAYERS_MAX; count <= LAYERS_MAX + 1; count++) {
+        exr_context_t context;
+        int part;
+        must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));
+        must(exr_add_part(context, "", EXR_STORAGE_SCANLINE, &part));
+        must(exr_initialize_required_attr_simple(context, 0, 1, 1, EXR_COMPRESSION_NONE));
+        for (int i = 0; i < count; i++)
+            must(exr_add_channel(context, 0, formatted("l%04d.Y", i), EXR_PIXEL_FLOAT,
+                                 EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+        must(exr_write_header(context));
+        static const float values[LAYERS_MAX + 1];
+        must(exr_write_scanline_chunk(context, 0, 0, values, (uint64_t)count * sizeof *values));
+        must(exr_finish(&context));
+        check_refused(NULL, count == LAYERS_MAX ? "several layers, l0000, l0001" : "more than 4096 layers");
+    }
+}
+
 // The image is black where the file has no pixels, and pixels outside of the image are not read.
 TEST(windows)
 {

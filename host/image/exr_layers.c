@@ -25,7 +25,10 @@ typedef struct {
     int alpha;             // or -1
 } Candidate;
 
-typedef ARRAY_OF(Candidate) CandidateList;
+typedef struct {
+    ARRAY_OF(Candidate);
+    bool has_more; // than LAYERS_MAX, which are left out
+} CandidateList;
 
 static Base base_of(const char *name)
 {
@@ -45,6 +48,7 @@ static bool is_alpha(const char *base)
     return strcasecmp(base, "A") == 0 || strcasecmp(base, "alpha") == 0;
 }
 
+// Returns the candidate of a layer, after adding it if it is missing, or NULL if the list is full.
 static Candidate *candidate_of(CandidateList *list, int part, const char *name, size_t length)
 {
     for (size_t i = list->count; i-- > 0;) {
@@ -52,6 +56,8 @@ static Candidate *candidate_of(CandidateList *list, int part, const char *name, 
         if (known->part == part && known->length == length && memcmp(known->name, name, length) == 0)
             return known;
     }
+    list->has_more = list->count == LAYERS_MAX;
+    if (list->has_more) return NULL;
     Candidate candidate = {.name = name, .length = length, .part = part, .first = -1, .alpha = -1};
     for (size_t i = 0; i < BASE_COUNT; i++)
         candidate.bases[i] = -1;
@@ -72,9 +78,9 @@ static exr_result_t candidates_add_part(CandidateList *list, exr_const_context_t
     for (int i = 0; i < channels->num_channels; i++) {
         const char *name = channels->entries[i].name.str, *dot = strrchr(name, '.');
         const char *base = dot ? dot + 1 : name;
-        if (list->count > LAYERS_MAX) return EXR_ERR_FILE_BAD_HEADER;
         Candidate *candidate =
             candidate_of(list, part, dot ? name : part_name, dot ? (size_t)(dot - name) : strlen(part_name));
+        if (!candidate) return EXR_ERR_SUCCESS;
         const exr_attr_chlist_entry_t *entry = &channels->entries[i];
         if (is_alpha(base)) {
             if (entry->pixel_type != EXR_PIXEL_UINT && entry->x_sampling == 1 && entry->y_sampling == 1)
@@ -162,30 +168,41 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
     return false;
 }
 
-static bool candidate_has_name(exr_const_context_t context, const Candidate *candidate, const char *name)
+static bool part_has_name(exr_const_context_t context, int part, const char *name)
 {
-    if (candidate->length == strlen(name) && memcmp(candidate->name, name, candidate->length) == 0)
-        return true;
     const char *part_name = NULL;
-    return candidate->length == 0 && exr_get_name(context, candidate->part, &part_name) == EXR_ERR_SUCCESS &&
-           part_name && strcmp(part_name, name) == 0;
+    return exr_get_name(context, part, &part_name) == EXR_ERR_SUCCESS && part_name &&
+           strcmp(part_name, name) == 0;
+}
+
+// Returns the layer of a name, otherwise the channels without a layer in a part of that name, or NULL.
+static const Candidate *candidate_named(exr_const_context_t context, const CandidateList *list,
+                                        const char *name)
+{
+    const Candidate *of_part = NULL;
+    for (size_t i = 0; i < list->count; i++) {
+        const Candidate *candidate = &list->items[i];
+        if (candidate->length == strlen(name) && memcmp(candidate->name, name, candidate->length) == 0)
+            return candidate;
+        if (!of_part && candidate->length == 0 && part_has_name(context, candidate->part, name))
+            of_part = candidate;
+    }
+    return of_part;
 }
 
 static bool named_layer_find(exr_const_context_t context, const CandidateList *list, const ImageFile *file,
                              ExrLayer *layer)
 {
     const char *name = file->options.layer;
+    const Candidate *candidate = candidate_named(context, list, name);
+    if (candidate) *layer = layer_of(candidate);
+    if (candidate && layer->form != EXR_OTHER) return true;
     char problem[128];
-    for (size_t i = 0; i < list->count; i++) {
-        const Candidate *candidate = &list->items[i];
-        if (!candidate_has_name(context, candidate, name)) continue;
-        *layer = layer_of(candidate);
-        if (layer->form != EXR_OTHER) return true;
+    if (candidate)
         snprintf(problem, sizeof problem,
                  "its layer '%.40s' has neither colors, luminance, X, Y and Z, nor one channel", name);
-        return channels_refuse(context, file, problem);
-    }
-    snprintf(problem, sizeof problem, "it has no layer '%.40s'", name);
+    else
+        snprintf(problem, sizeof problem, "it has no layer '%.40s'", name);
     return channels_refuse(context, file, problem);
 }
 
@@ -212,11 +229,13 @@ bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer
     CandidateList list = {0};
     int part_count = 0;
     exr_result_t code = exr_get_count(context, &part_count);
-    for (int part = 0; part < part_count && code == EXR_ERR_SUCCESS; part++)
+    for (int part = 0; part < part_count && code == EXR_ERR_SUCCESS && !list.has_more; part++)
         code = candidates_add_part(&list, context, part);
     bool found = false;
     if (code != EXR_ERR_SUCCESS)
         image_refuse(file, "EXR: %s", exr_get_default_error_message(code));
+    else if (list.has_more)
+        image_refuse(file, "EXR: more than %d layers", LAYERS_MAX);
     else if (list.count == 0 && part_count > 0)
         image_refuse(file, "EXR: deep images are not supported");
     else if (file->options.layer)

@@ -25,7 +25,7 @@ typedef struct {
     bool has_alpha; // in the channel after them
 } ExrLayer;
 
-// Finds the layer that `file->layer` names. If that is NULL, chooses the default layer, whose channels have
-// no prefix, if it has light, else the only layer with light, else the default layer or the only one with
-// numbers. Returns false with the names to choose from unless exactly one layer qualifies.
+// Finds the layer that `file->options.layer` names. If that is NULL, chooses the default layer, whose
+// channels have no prefix, if it has light, else the only layer with light, else the default layer or the
+// only one with numbers. Returns false with the names to choose from unless exactly one layer qualifies.
 bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer *layer);
