@@ -376,7 +376,8 @@ TEST(what_is_not_used_is_reported_once)
         "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_refl b.png\n"
         "newmtl more\nTf 1 0 0\nmap_refl b.png\nPr 0.5\n");
     OwnedScene scene = scene_of_obj(
-        "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt nan 0\nvt 0 1e31\nvn 0 inf 0\n"
+        "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 abc\nvt nan 0\nvt 0 1e31\nvn 0 inf "
+        "0 abc\n"
         "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
         "scene.yaml:4:18: warning: a.obj: texture coordinates that are not finite or too large, "
         "read as 0: 2\n"
@@ -391,6 +392,7 @@ TEST(what_is_not_used_is_reported_once)
         "a.mtl:9:1: warning: 'map_refl' is not used\n"
         "a.mtl:13:1: warning: 'Pr' is not used\n"
         "a.obj:3:11: warning: colors of vertices are not used\n"
+        "a.obj:5:9: warning: words after the last number of a row are not used\n"
         "a.obj:10:1: warning: 'l' is not used\n"
         "a.obj:11:1: warning: 'p' is not used\n"
         "a.obj:13:1: warning: 'cstype' is not used\n");
@@ -504,7 +506,8 @@ TEST(faults_have_their_place)
          "a.obj:3:5: error: '0x1' is not a coordinate: a number up to 1e+30\n"},
         {"v 0 0 0 0\n", "a.obj:1:10: error: the fourth number of a vertex is 0\n"},
         {CORNERS "f 1 2 4\n", "a.obj:4:7: error: a face names vertex 4 (from 1); there are 3\n"},
-        {CORNERS "f 1 2 0\n", "a.obj:4:7: error: a face names vertex 0; there are 3 before it\n"},
+        {CORNERS "f 1 2 0\n",
+         "a.obj:4:7: error: a face names vertex 0; indices count from 1, or backward from -1\n"},
         {CORNERS "f -4 2 3\n", "a.obj:4:3: error: a face names vertex -4; there are 3 before it\n"},
         {CORNERS "f 1 2 9999999999\n",
          "a.obj:4:7: error: a face names vertex 9999999999; there are 3 before it\n"},

@@ -11,10 +11,19 @@ typedef struct {
     MeshDraft *draft;
     Line line;
     UnusedWords unused;
-    bool has_colors;
-    bool lacks[DRAFT_PART_COUNT]; // whether a missing index was warned of
+    bool has_colors, has_more_words; // whether a warning of them was given
+    bool lacks[DRAFT_PART_COUNT];    // whether a missing index was warned of
     ObjMaterials materials;
 } ObjReader;
+
+// Warns once of words after the numbers of a row.
+static void end_expect(ObjReader *reader)
+{
+    if (reader->has_more_words || !line_has_word(&reader->line)) return;
+    report_warning(&reader->draft->report, line_offset(&reader->line),
+                   "words after the last number of a row are not used");
+    reader->has_more_words = true;
+}
 
 // Reads a position. A fourth number is homogeneous, and further ones are a color.
 static bool position_read(ObjReader *reader)
@@ -31,6 +40,8 @@ static bool position_read(ObjReader *reader)
     } else if (count == 4 && !reader->has_colors) {
         report_warning(&draft->report, offset, "colors of vertices are not used");
         reader->has_colors = true;
+    } else if (count == 3) {
+        end_expect(reader);
     }
     return draft_add_vertex(draft, position, count < 3 ? offset : 0);
 }
@@ -40,6 +51,7 @@ static bool uv_read(ObjReader *reader)
     double numbers[3] = {NAN, 0, 0};
     const int count = line_try_numbers(&reader->line, numbers, 3);
     if (count < 2 && line_has_word(&reader->line)) numbers[count] = NAN;
+    if (count >= 2) end_expect(reader);
     draft_add_uv(reader->draft, numbers[0], numbers[1]);
     return true;
 }
@@ -49,6 +61,7 @@ static bool normal_read(ObjReader *reader)
     double numbers[3] = {0};
     const int count = line_try_numbers(&reader->line, numbers, 3);
     const Vector3 normal = {numbers[0], numbers[1], numbers[2]};
+    if (count == 3) end_expect(reader);
     array_push(reader->draft->normals, count == 3 ? normal : vector_all(NAN));
     return true;
 }
@@ -66,6 +79,8 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
 {
     MeshDraft *draft = reader->draft;
     const size_t count = draft_part_count(draft, part);
+    if (part == DRAFT_POSITION && index == 0)
+        return draft_fails(draft, offset, "a face names vertex 0; indices count from 1, or backward from -1");
     if (part == DRAFT_POSITION)
         return draft_fails(draft, offset, "a face names vertex %lld; there are %zu before it",
                            (long long)index, count);
