@@ -113,7 +113,10 @@ static void arrays_prepare(CompiledScene *compiled, const CompiledScene *parts, 
         if (extended[i] == FLAT_TRIANGLE_BLOCKS) block_count += count;
     }
     FlatArray *firsts = &compiled->arrays[FLAT_BLOCK_TRIANGLES];
-    array_extend(compiled, FLAT_BLOCK_TRIANGLES, (block_count + 3) / 4 - firsts->count);
+    const size_t added = (block_count + 3) / 4 - firsts->count;
+    array_extend(compiled, FLAT_BLOCK_TRIANGLES, added);
+    // the last struct may be filled in part
+    memset(flat_array_at(firsts, firsts->count), 0, added * firsts->layout.size);
 }
 
 void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
