@@ -260,9 +260,8 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     // Renaming would replace a read-only file.
     if (exists && access(output->target, W_OK) != 0) return output_failed(output, "write", messages);
     if (!folder_open(output)) return output_failed(output, "create", messages);
-    old.st_mode &= MODE_BITS;
-    return output_create_next_to(output, exists ? MODE_PRIVATE : MODE_NEW, exists ? &old.st_mode : NULL,
-                                 messages);
+    return output_create_next_to(output, exists ? MODE_PRIVATE : MODE_NEW,
+                                 exists ? &(mode_t){old.st_mode & MODE_BITS} : NULL, messages);
 }
 
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)
