@@ -248,7 +248,7 @@ class Reports(TestCase):
         self.assertEqual(process.stdout.splitlines(), [
             "sphere.yaml: 1 object, 2 lights, 1 material", "bad.yaml: 2 errors",
             "dark.yaml: 1 object, 0 lights, 1 material, 1 warning", "missing.yaml: 1 error"])
-        self.assertRegex(process.stderr, "(?ms)^bad.yaml:1:9: error.*^bad.yaml:2:1: error.*dark.yaml: no lights")
+        self.assertRegex(process.stderr, "(?ms)^bad.yaml:1:9: error.*^bad.yaml:2:1: error.*dark.yaml: warning: no lights")
         self.assertEqual(self.glint("check sphere.yaml sphere.yaml").stdout.count("\n"), 2)
 
     def test_check(self):

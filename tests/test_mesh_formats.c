@@ -326,7 +326,7 @@ TEST(a_reply_counts_the_warnings_beyond_the_limit)
     OwnedMessageList messages = {0};
     reply_pass(&view, 25, &view, &messages);
     assert_int_equal(messages.count, 21);
-    assert_string_equal(messages.items[20].text, "a.fbx: 5 more warnings");
+    assert_string_equal(messages.items[20].text, "5 more warnings are not shown");
 }
 
 TEST_MAIN(formats_open, formats_close)

@@ -72,7 +72,9 @@ TEST(text_between_blocks_is_skipped)
 
 TEST(no_lights_no_objects)
 {
-    assert_messages("s.cfg", CAMERA, "warning: s.cfg: no objects\nwarning: s.cfg: no lights\n");
+    assert_messages("s.cfg", CAMERA,
+                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
+                    "light and emission are shown\n");
 }
 
 TEST_MAIN(set_up, complete_close)

@@ -225,7 +225,7 @@ TEST(losses)
           "7:105: warning: 'trans_raster3d' is not used: opacity does not depend on the angle\n");
     assert_messages("s.dat", BEGIN CAMERA_OF("projection fisheye", "") SPHERE,
                     "3:19: warning: the fisheye projection becomes one in perspective\n"
-                    "warning: s.dat: no lights\n");
+                    "warning: no lights: only ambient light and emission are shown\n");
 }
 
 TEST(fading)

@@ -28,7 +28,8 @@ typedef struct {
 static void check_examples(void **state)
 {
     const Examples *examples = *state;
-    const char *camera_alone = "warning: s.yaml: no objects\nwarning: s.yaml: no lights\n";
+    const char *camera_alone = "warning: no objects: only the background is shown\nwarning: no lights: only "
+                               "ambient light and emission are shown\n";
     OwnedText fence = {0};
     text_appendf(&fence, "\n```%s\n", examples->language);
     size_t count = 0;

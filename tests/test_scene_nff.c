@@ -117,8 +117,9 @@ TEST(tolerated)
                     "8:1: warning: a degenerate polygon is never hit\n");
     assert_messages("s.nff", LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
                     "8:1: warning: the polygon intersects itself; only parts are filled\n");
-    assert_messages("s.nff", LIT, "warning: s.nff: no objects\n");
-    assert_messages("s.nff", VIEW MATERIAL SPHERE, "warning: s.nff: no lights\n");
+    assert_messages("s.nff", LIT, "warning: no objects: only the background is shown\n");
+    assert_messages("s.nff", VIEW MATERIAL SPHERE,
+                    "warning: no lights: only ambient light and emission are shown\n");
 }
 
 static void check_sides(const char *shape, double reach, bool only_inside)

@@ -90,7 +90,9 @@ TEST(blanks_comments_and_line_ends)
 
 TEST(missing_parts_are_fine)
 {
-    assert_messages("s.rt", CAMERA, "warning: s.rt: no objects\nwarning: s.rt: no lights\n");
+    assert_messages("s.rt", CAMERA,
+                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
+                    "light and emission are shown\n");
     OwnedScene scene = scene_of_text("s.rt", CAMERA);
     assert_vector(scene.ambient, 0, 0, 0);
     assert_int_equal(scene.width, 0);
@@ -190,7 +192,7 @@ TEST(many_warnings_are_counted)
         text_appendf(&text, "pl 0,0,0 0,0.5,0 255,0,0\n");
     OwnedText messages = scene_messages("s.rt", text_c(&text), false);
     assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not a unit vector; normalized\n"
-                                              "warning: s.rt: 10 more warnings\n"));
+                                              "warning: 10 more warnings are not shown\n"));
 }
 
 TEST_MAIN(set_up, complete_close)

@@ -144,7 +144,8 @@ TEST(energy)
                     "light\n"
                     "5:36: warning: reflection 0.04 and transmission 1 exceed 1 together: the surface adds "
                     "light; by 'fresnel' it reflects a part of its transmission\n"
-                    "warning: a.yaml: no objects\nwarning: a.yaml: no lights\n");
+                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
+                    "light and emission are shown\n");
 }
 
 TEST(shapes)
@@ -406,8 +407,9 @@ TEST(the_largest_frame_rate_is_allowed)
 TEST(warnings)
 {
     assert_messages("s.yaml", LIT SPHERE, "");
-    assert_messages("s.yaml", CAMERA SPHERE, "warning: s.yaml: no lights\n");
-    assert_messages("s.yaml", LIT, "warning: s.yaml: no objects\n");
+    assert_messages("s.yaml", CAMERA SPHERE,
+                    "warning: no lights: only ambient light and emission are shown\n");
+    assert_messages("s.yaml", LIT, "warning: no objects: only the background is shown\n");
     assert_messages("s.yaml", LIT "objects:\n  - triangle: {vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}\n",
                     "5:15: warning: a triangle without area is never hit\n");
 }

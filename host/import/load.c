@@ -23,8 +23,12 @@ bool scene_finish(Scene *scene, Report *report, const SceneOptions *options)
         scene_free(scene);
         return false;
     }
-    if (!scene->objects.count) message_warning(report->messages, "%s: no objects", report->source->file);
-    if (!scene->lights.count) message_warning(report->messages, "%s: no lights", report->source->file);
+    if (!scene->objects.count)
+        message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
+                       "no objects: only the background is shown");
+    if (!scene->lights.count)
+        message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
+                       "no lights: only ambient light and emission are shown");
     return true;
 }
 

@@ -111,7 +111,9 @@ static void report_sort(Report *report)
     }
     list->count = kept;
     message_list_move(list, &report->included);
-    if (report_is_full(report)) message_error(list, "%s: many errors: reading stopped", report->source->file);
+    if (report_is_full(report))
+        message_add_at(list, MESSAGE_ERROR, report->source, MESSAGE_WHOLE_FILE,
+                       "too many errors; reading stopped");
 }
 
 static size_t warnings_beyond_limit(const Report *report)
@@ -141,6 +143,8 @@ bool report_close(Report *report)
 {
     report_sort(report);
     const size_t more = warnings_beyond_limit(report);
-    if (more > 0) message_warning(report->messages, "%s: %zu more warnings", report->source->file, more);
+    if (more > 0)
+        message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
+                       "%zu more warnings are not shown", more);
     return report->error_count == 0;
 }
