@@ -215,13 +215,13 @@ TEST(messages_name_the_included_file)
         "scene.yaml", (const char *[]){"ambient=-1"}, 1,
         "scene.yaml:7:19: error: sphere lacks 'center'\n"
         "scene.yaml:7:19: error: sphere lacks 'radius'\n"
-        "parts/a.yaml:2:41: error: 'radius' must be greater than 0\n"
+        "parts/a.yaml:2:41: error: 'radius' must be greater than 0, not '-1'\n"
         "parts/a.yaml:3:18: error: parts/lost.obj: No such file or directory\n"
         "parts/a.yaml:4:1: error: unknown scene key 'purple'; the choices are include, camera, frames, fps, "
         "shutter, background, ambient, lights, materials, define, objects\n"
         "b.yaml:1:19: error: sphere lacks 'center'\n"
         "b.yaml:1:19: error: sphere lacks 'radius'\n"
-        "--set:1:9: error: 'ambient' must be 0 or more\n");
+        "--set:1:9: error: 'ambient' must be 0 or more, not '-1'\n");
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: 1\n");
     file_write("b.yaml", "objects: {}\nlights: []\ndefine: []\nlights: []\n");
     check_messages("scene.yaml", NULL, 0,

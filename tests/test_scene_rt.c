@@ -178,10 +178,10 @@ TEST(lenient_keeps_other_errors)
                                             "L 0,0,0 -1\n",
                                         true);
     assert_string_equal(text_c(&messages),
-                        "3:10: error: 'diameter' must be greater than 0\n"
+                        "3:10: error: 'diameter' must be greater than 0, not '-2'\n"
                         "4:7: error: 'center' must be a number, not nothing\n"
                         "5:4: error: 'center' must be three numbers with commas between, not '0, 0'\n"
-                        "6:9: error: 'ratio' must be 0 or more\n");
+                        "6:9: error: 'ratio' must be 0 or more, not '-1'\n");
 }
 
 TEST(many_warnings_are_counted)

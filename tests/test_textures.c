@@ -512,9 +512,9 @@ TEST(scene_faults_are_reported)
     assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n",
                     "4:13: error: 'size' needs an 'image' or a 'normal_map'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
-                    "4:27: error: 'size' must be greater than 0\n");
+                    "4:27: error: 'size' must be greater than 0, not '0'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, cutout: 50}\n",
-                    "4:29: error: 'cutout' must be from 0 to 1\n");
+                    "4:29: error: 'cutout' must be from 0 to 1, not '50'\n");
     assert_messages("s.yaml", MATERIALS "  a: {cutout: 0.5}\n", "4:6: error: material lacks 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
                     "4:14: error: 'image' must be the name of a file, not a list of 2\n");

@@ -158,7 +158,8 @@ bool line_whole_number(Line *line, const char *name, const Range *range, void *v
     if (!line_number(line, name, range, &number)) return false;
     if (number != floor(number)) {
         line->at = word.text;
-        return report_error(line->report, word.offset, "'%s' must be a whole number", name);
+        return report_error(line->report, word.offset, "'%s' must be a whole number, not '%.*s'", name,
+                            WORD_TEXT(word));
     }
     *(unsigned *)value = (unsigned)number;
     return true;

@@ -139,6 +139,7 @@ bool number_read_field(Report *report, Word word, const char *name, const Range 
         break;
     }
     if (range && !range_holds(range, *value))
-        return report_error(report, word.offset, "'%s' must be %s", name, range->must);
+        return report_error(report, word.offset, "'%s' must be %s, not '%.*s'", name, range->must,
+                            WORD_TEXT(word));
     return true;
 }

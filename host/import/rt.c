@@ -16,7 +16,7 @@ typedef struct {
 } RtReader;
 
 static const Range range_axis = {-1, 1, false, "from -1 to 1"},
-                   range_ratio = {0, 1, false, "from 0 to 1; with --lenient 0 or more"};
+                   range_ratio = {0, 1, false, "from 0 to 1 (0 or more with --lenient)"};
 
 static bool color_read(Line *line, Color *color)
 {

@@ -27,7 +27,8 @@ static bool read_fractions(YamlReader *reader, const Field *field, const YamlNod
     Color *color = target;
     return read_color(reader, field, node, color) &&
            (vector_largest(*color) <= field->range->high ||
-            report_error(&reader->report, node->offset, "'%s' must be %s", field->name, field->range->must));
+            report_error(&reader->report, node->offset, "'%s' must be %s, not %g", field->name,
+                         field->range->must, vector_largest(*color)));
 }
 
 static bool read_absorption(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -160,7 +161,8 @@ static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *
     if (!read_strength(reader, field, node, &channels)) return false;
     *factor = (TintedFactor){vector_largest(channels), color_tint(channels)};
     return factor->largest <= field->range->high ||
-           report_error(&reader->report, node->offset, "'%s' must be %s", field->name, field->range->must);
+           report_error(&reader->report, node->offset, "'%s' must be %s, not %g", field->name,
+                        field->range->must, factor->largest);
 }
 
 static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
