@@ -2,7 +2,8 @@
 //
 // Above this file, code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both. Operators widen
-// scalars to all lanes. Arguments of functions need a cast.
+// scalars to all lanes. Arguments of functions need a cast. Constants need the suffix f unless they exist
+// only at double.
 //
 // The host defines these macros before the text (prelude_of in host/render/pass.c):
 //     LANES            1, 4, 8 or 16

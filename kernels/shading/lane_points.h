@@ -65,8 +65,8 @@ static inline real cubes_error(const SurfacePoint *point, scalar4 grid, real pos
            8 * UNIT_ROUNDOFF * (per_unit * vector_norm1(point->position) + vector_norm1(vector_of(grid)) + 1);
 }
 
-// Returns the lanes where the checker has its second color. Adds those where that is uncertain to the points.
-// On planes and discs squares lie in the surface. Elsewhere they are cubes in space.
+// Returns the lanes where the checker has its second color. Adds the lanes where that is uncertain to
+// points->uncertain. On planes and discs squares lie in the surface. Elsewhere they are cubes in space.
 static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *points, const Ray *ray, scalar4 grid,
                                real position_error)
 {
@@ -92,7 +92,8 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *points, co
     return real_floor(halved) != halved;
 }
 
-// Completes the lookup of a material's images. That of triangles has the coordinates and tangents.
+// Completes the lookup of a material's images. For triangles it already has the coordinates and
+// tangents.
 static inline void points_set_images(LaneSurfacePoints *points, const Scene *scene, const Material *material,
                                      const Ray *ray, real travelled)
 {

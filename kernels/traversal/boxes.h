@@ -142,8 +142,7 @@ static inline uint box_rays_same_octant(const BoxRays *rays, uint lanes)
     return lanes & (x & first ? x : ~x) & (y & first ? y : ~y) & (z & first ? z : ~z);
 }
 
-// Returns where rays are between the near and the far planes of boxes, between tmin and tmax. Sets *entry to
-// where they enter.
+// Returns the lanes whose ray is within its box at some t from tmin to tmax. Sets *entry to where rays enter.
 static inline mask slabs_intersect(Vector near, Vector far, Vector inverse, Vector to_near, Vector to_far,
                                    real tmin, real tmax, real *entry)
 {
