@@ -28,7 +28,7 @@ static bool is_block(uint32_t child_type)
 }
 
 // Returns the index of a block's first primitive, to be read or set.
-static uint32_t *block_place(const CompiledScene *compiled, unsigned type, size_t block)
+static uint32_t *block_first_index(const CompiledScene *compiled, unsigned type, size_t block)
 {
     if (type == TYPE_SPHERES) return sphere_block_at(compiled, block).indices;
     return (uint32_t *)compiled->arrays[FLAT_BLOCK_TRIANGLES].items + block;
@@ -52,7 +52,7 @@ void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
         for (unsigned k = 0; k < width; k++) {
             if (!is_block(node.child_type[k])) continue;
             const unsigned type = leaf_type(node.child_type[k]);
-            *block_place(compiled, type, next[type]) = node.child_index[k];
+            *block_first_index(compiled, type, next[type]) = node.child_index[k];
             node.child_index[k] = next[type]++;
         }
     }
@@ -67,7 +67,7 @@ size_t leaf_first(const CompiledScene *compiled, const FlatNode *node, unsigned 
 {
     const size_t index = node->child_index[child];
     if (blocks_count(compiled) == 0 || !is_block(node->child_type[child])) return index;
-    return *block_place(compiled, leaf_type(node->child_type[child]), index);
+    return *block_first_index(compiled, leaf_type(node->child_type[child]), index);
 }
 
 static void triangle_block_fill(const CompiledScene *compiled, size_t block, unsigned count)
@@ -77,7 +77,7 @@ static void triangle_block_fill(const CompiledScene *compiled, size_t block, uns
     // floats are narrowed here because the blocks of a million triangles take 130 MB as doubles
     const bool is_double = blocks->layout.scalar4_count > 0;
     const size_t width = 4 * (blocks->layout.scalar4_count + blocks->layout.uint4_count) / BLOCK_ROWS;
-    const size_t first = *block_place(compiled, TYPE_TRIANGLES, block);
+    const size_t first = *block_first_index(compiled, TYPE_TRIANGLES, block);
     void *rows = flat_array_at(blocks, block);
     for (size_t lane = 0; lane < width; lane++) {
         const Triangle *triangle = flat_array_at(triangles, first + (lane < count ? lane : 0));

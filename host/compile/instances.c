@@ -52,12 +52,12 @@ double map_condition(const InstanceMap *map)
     return condition;
 }
 
-void map_round(const Rounding *rounding, const InstanceMap *map, const double place[3], scalar4 rows[3],
+void map_round(const Rounding *rounding, const InstanceMap *map, const double translation[3], scalar4 rows[3],
                scalar4 inverses[3])
 {
     for (int i = 0; i < 3; i++) {
-        rows[i] =
-            scalar4_of(vector_rounded(rounding, vector_from(map->rows[i])), rounded(rounding, place[i]));
+        rows[i] = scalar4_of(vector_rounded(rounding, vector_from(map->rows[i])),
+                             rounded(rounding, translation[i]));
         inverses[i] = scalar4_of(vector_rounded(rounding, vector_from(map->inverses[i])), 0);
     }
 }
@@ -211,7 +211,7 @@ void instance_flatten(Flattening *flattening, const Object *object, uint32_t sha
     const Rounding *rounding = &flattening->rounding;
     const InstanceMap map = instance_map(transform, shared->scale, rounding->is_double);
     const Vector3 seen = vector_subtract(affine_point(transform, shared->center), rounding->eye);
-    double place[3] = {seen.x, seen.y, seen.z};
+    double translation[3] = {seen.x, seen.y, seen.z};
     const double eye[3] = {rounding->eye.x, rounding->eye.y, rounding->eye.z};
     const double half[3] = {shared->extent.x, shared->extent.y, shared->extent.z};
     double extent[3];
@@ -221,14 +221,15 @@ void instance_flatten(Flattening *flattening, const Object *object, uint32_t sha
         for (int k = 0; k < 3; k++)
             extent[i] += fabs(map.rows[i][k]) * half[k];
         if (rounding->is_double)
-            place[i] = (double)(quad3_dot(quad3(vector_from(row)), quad3(shared->center)) + row[3] - eye[i]);
+            translation[i] =
+                (double)(quad3_dot(quad3(vector_from(row)), quad3(shared->center)) + row[3] - eye[i]);
     }
     const bool replaces = object->as.mesh.has_own_material && shared->material == 0;
     Instance instance = {
         .extent = {extent[0], extent[1], extent[2], map_condition(&map)},
         .id = {0, shared_mesh, replaces ? 1 + object->material : 0, 0},
     };
-    map_round(rounding, &map, place, instance.rows, instance.inverses);
+    map_round(rounding, &map, translation, instance.rows, instance.inverses);
     instance.inverses[0].w = sqrt(fabs(map.determinant));
     const uint32_t first = (uint32_t)flattening->primitive_count,
                    count = (uint32_t)object_primitive_count(flattening->scene, object);

@@ -39,8 +39,8 @@ InstanceMap instance_map(const Affine *transform, double scale, bool is_exact);
 // Returns the largest sum of a row of |map| |inverse|, which is NAN or infinite if the map has no inverse.
 double map_condition(const InstanceMap *map);
 
-// Rounds the map into the rows of a flat struct, with `place` in their last numbers.
-void map_round(const Rounding *rounding, const InstanceMap *map, const double place[3], scalar4 rows[3],
+// Rounds the map into the rows of a flat struct, with `translation` in their last numbers.
+void map_round(const Rounding *rounding, const InstanceMap *map, const double translation[3], scalar4 rows[3],
                scalar4 inverses[3]);
 
 bool object_is_instance(const Object *object);

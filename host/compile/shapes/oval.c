@@ -30,7 +30,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
     const Affine transform = oval_map(object);
-    const Vector3 place = point_from_eye(rounding, object->as.oval.center);
+    const Vector3 center = point_from_eye(rounding, object->as.oval.center);
     const double *radii = object->as.oval.radii, half_height = object->as.oval.half_height;
     const bool is_bounded = oval_is_bounded(object);
     double least, most;
@@ -52,7 +52,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
                 (object->as.oval.caps ? REVOLUTION_CAPPED : 0u),
         .id.z = object->as.oval.unit,
     };
-    map_round(rounding, &map, (const double[]){place.x, place.y, place.z}, oval.rows, oval.inverses);
+    map_round(rounding, &map, (const double[]){center.x, center.y, center.z}, oval.rows, oval.inverses);
     oval.inverses[0].w = unit / least * (1 + 1e-6); // more than the roundings
     oval.inverses[1].w = reach;
     if (object->as.oval.unit == SHAPE_TORUS) {
