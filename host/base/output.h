@@ -11,7 +11,7 @@
 typedef struct OutputFile {
     FILE *file;
     char *target;
-    int folder; // of the target; undefined where the target is written directly, a device or a pipe
+    int folder; // the target's, if has_folder; a device or a pipe is written directly
     bool has_folder, is_private, is_finished;
     const char *name;                // of the target in its folder
     char *temporary;                 // the name in the folder until the rename, or NULL
@@ -28,7 +28,7 @@ bool output_open_private(OutputFile *output, int folder, const char *name, Messa
 // Writes bytes. On failure adds a message and returns false; the file stays open until it is abandoned.
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
 // Flushes, syncs and checks for write errors (disk full), which leaves only the renaming to output_commit.
-// On failure adds a message and removes the temporary.
+// On failure adds a message and removes the temporary. output_commit must not follow.
 bool output_finish(OutputFile *output, MessageList *messages);
 // Finishes the file if it is not finished, renames it and syncs its folder. On failure adds a message and
 // removes the temporary. An earlier file is untouched unless syncing the folder or closing fails, which

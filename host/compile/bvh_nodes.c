@@ -111,7 +111,7 @@ static Bounds node_bounds(const FlatNode *node)
 {
     Bounds all = bounds_empty();
     for (unsigned k = 0; k < node->width; k++) {
-        if (node->child_type[k] == 0) continue;
+        if (node->child_type[k] == BVH_EMPTY) continue;
         const double *low = node->planes + k, *high = low + (size_t)BVH_HIGH * node->width;
         const size_t y = node->width, z = 2 * y;
         all = bounds_join(all, (Bounds){{low[0], low[y], low[z]}, {high[0], high[y], high[z]}});
@@ -142,6 +142,6 @@ void bvh_refit(CompiledScene *compiled)
     for (size_t i = 0; i < nodes->count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < node.width; k++)
-            if (node.child_type[k] == 0) child_box_write(&node, k, &empty);
+            if (node.child_type[k] == BVH_EMPTY) child_box_write(&node, k, &empty);
     }
 }

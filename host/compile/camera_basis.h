@@ -16,8 +16,8 @@ typedef struct {
 // `up` that is zero or parallel to the view.
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height);
 
-// Returns a bound on the error of a kernel's rays in perspective, in units of roundoff of their length.
-// Beyond CAMERA_DIRECTION_ERROR_MAX the rays of the eye are farther off than cull spheres allow at
-// `certified`. With a shifted frame it is CAMERA_SHIFT_ERROR times 1 + |middle|.
+// Returns a bound on the error of a kernel's rays in perspective, in units of roundoff of their length. With
+// a shifted frame the bound is CAMERA_SHIFT_ERROR times 1 + |middle|. Beyond CAMERA_DIRECTION_ERROR_MAX the
+// rays of the eye are farther off than cull spheres allow at `certified`.
 enum { CAMERA_DIRECTION_ERROR_MAX = 32, CAMERA_SHIFT_ERROR = 6 };
 double camera_direction_error(const CameraBasis *basis);

@@ -7,8 +7,8 @@
 
 // Compiles a scene. Rounds each of its numbers to the kernel's precision once, after subtracting the eye's
 // position in double, and derives axes, slopes and squares of a checker from the rounded numbers. Returns
-// false with a message, and nothing to free, if the scene is too large or if a number or a light's distance
-// does not fit the precision.
+// false with a message, and nothing to free, if the scene is too large, if a number or a light's distance
+// does not fit the precision, or if `certified` has no error bound for a feature.
 bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                    MessageList *messages);
 // Recompiles for another camera, size, samples or bounces. All else in `scene` and `settings` must be what

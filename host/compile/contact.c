@@ -86,13 +86,13 @@ static Bounds regions_overlap(const ContactRegion *a, const ContactRegion *b, do
     return both;
 }
 
-// Returns whether an instance has transparent triangles, or opaque ones.
-static bool instance_has(const CompiledScene *compiled, const Instance *instance, bool is_transparent,
-                         bool transparent)
+// Returns whether an instance has transparent triangles or, if `wants_transparent` is false, opaque ones.
+static bool instance_has(const CompiledScene *compiled, const Instance *instance, bool object_is_transparent,
+                         bool wants_transparent)
 {
     const SharedMeshPlan *shared = &compiled->instances->meshes[instance->id.y];
-    if (instance->id.z > 0) return is_transparent == transparent;
-    return transparent ? shared->is_transparent_somewhere : shared->is_opaque_somewhere;
+    if (instance->id.z > 0) return object_is_transparent == wants_transparent;
+    return wants_transparent ? shared->is_transparent_somewhere : shared->is_opaque_somewhere;
 }
 
 // Collects the transparent or the opaque primitives. Returns their largest coordinate.

@@ -9,7 +9,7 @@ void scene_scale(Scene *scene, double factor);
 // scene_scaled_free.
 Scene scene_scaled(const Scene *scene, double factor);
 void scene_scaled_free(Scene *scaled);
-// Negates x, which mirrors the image. Leaves meshes unchanged.
+// Negates x, which mirrors the image unless its frame is shifted. Leaves meshes and images unchanged.
 void scene_mirror(Scene *scene);
 // Turns x into y, y into z and z into x, except in meshes. The image changes by rounding only.
 void scene_turn_axes(Scene *scene);

@@ -1,4 +1,5 @@
-// Computes the sRGB curve of numbers between 0 and 1 (IEC 61966-2-1:1999), without rounding to steps.
+// Computes the sRGB curve of numbers between 0 and 1 (IEC 61966-2-1:1999), without rounding to steps, and the
+// light of an image's pixels.
 #pragma once
 
 #include "host/image/image.h"
@@ -14,8 +15,8 @@ static inline double srgb_encode(double linear)
     return linear <= 0.0031308 ? linear * 12.92 : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-// Sets the light of pixel i of an image. `decodes` undoes the sRGB curve. Values below 0, which filters of
-// other programs leave, become 0.
+// Sets the light of pixel i of an image. With `decodes`, its values are from 0 to 1 and the sRGB curve is
+// undone. Otherwise values below 0, which filters of other programs leave, become 0.
 static inline void image_light(const Image *image, size_t i, bool decodes, float color[3])
 {
     for (size_t channel = 0; channel < 3; channel++) {

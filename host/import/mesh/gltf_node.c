@@ -116,7 +116,8 @@ static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfM
     }
 }
 
-// Adds a triangle that has an area before the node's transform, whose rounding could create one.
+// Adds a triangle. Collapses it to a point if it has no area before the node's transform, whose rounding
+// could create one.
 static void triangle_add(MeshDraft *draft, const Vertices *vertices, size_t a, size_t b, size_t c)
 {
     size_t corners[3] = {a, vertices->is_mirrored ? c : b, vertices->is_mirrored ? b : c};
