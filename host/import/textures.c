@@ -115,25 +115,25 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, uint32_t 
 
 // Describes how a scene uses the alpha of an image.
 typedef struct {
-    bool loses;  // a material shows the image as opaque, although its format does not ask for that
-    bool cuts;   // a material has holes where alpha is low
-    bool blends; // those holes replace blending
-    bool asks;   // the scene's author asked for those holes
+    bool is_ignored;   // a material shows the image as opaque, although its format does not ask for that
+    bool cuts;         // a material has holes where alpha is low
+    bool blends;       // those holes replace blending
+    bool is_requested; // the scene's author asked for those holes
 } AlphaUse;
 
 // Returns the use of each image. The caller frees it.
 static AlphaUse *alpha_uses(const Scene *scene)
 {
     AlphaUse *uses = memory_allocate_zeroed(scene->textures.count + 1, sizeof *uses);
-    uses[scene->sky.texture].loses = true; // uses[0] stands for materials without an image
+    uses[scene->sky.texture].is_ignored = true; // uses[0] stands for materials without an image
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];
         const uint32_t cutout = material->cutout.threshold > 0 ? material->cutout.texture : 0;
         uses[cutout].cuts = true;
         uses[cutout].blends |= material->cutout.blends;
-        uses[cutout].asks |= !material->image.ignores_alpha;
+        uses[cutout].is_requested |= !material->image.ignores_alpha;
         if (material->image.texture != cutout)
-            uses[material->image.texture].loses |= !material->image.ignores_alpha;
+            uses[material->image.texture].is_ignored |= !material->image.ignores_alpha;
     }
     return uses;
 }
@@ -150,10 +150,10 @@ static bool is_translucent(const Image *image)
 // Returns the warning that an image's alpha requires, or NULL if it requires none.
 static const char *alpha_warning(const Image *image, const AlphaUse *use)
 {
-    if (image->alpha && use->loses) return "is ignored: its transparent parts are opaque";
+    if (image->alpha && use->is_ignored) return "is ignored: its transparent parts are opaque";
     if (use->cuts && use->blends && is_translucent(image))
         return "does not blend: below 0.5 the surface is cut out, elsewhere it is opaque";
-    return use->asks && !image->alpha ? "is 1 everywhere: nothing is cut out" : NULL;
+    return use->is_requested && !image->alpha ? "is 1 everywhere: nothing is cut out" : NULL;
 }
 
 // Removes the holes of opaque images, so that kernels need not look for them.
