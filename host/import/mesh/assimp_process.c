@@ -116,7 +116,7 @@ static bool child_fails(MeshDraft *draft, int status)
         return draft_refuse(draft, "assimp needs more than %d s to read it", ASSIMP_SECONDS_MAX);
     if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
         return draft_refuse(draft, "assimp needs more than %d MiB to read it", ASSIMP_MEBIBYTES_MAX);
-    return draft_refuse(draft, "assimp %s on it", by != 0 ? "crashes" : "fails");
+    return draft_refuse(draft, "assimp %s while reading it", by != 0 ? "crashed" : "failed");
 }
 
 bool assimp_process_read(MeshDraft *draft)

@@ -312,7 +312,7 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
     ReplyHeader header;
     ReplyLists lists = {0};
     uint32_t textures[SCENE_TEXTURES_MAX];
-    bool is_sound = reply_read(draft, reply, &header, &lists);
+    bool is_sound = reply_read(draft, reply, &header, &lists) && header.warning_count <= UINT32_MAX;
     if (is_sound) messages_add(draft, &lists, header.warning_count);
     is_sound = is_sound && textures_add(draft, &lists, textures) && materials_add(draft, &lists, textures) &&
                view_add(draft, &lists, &header) && draft_is_sound(draft, &header, lists.materials.count);
