@@ -488,8 +488,8 @@ TEST(many_large_polygons_are_refused)
     file_write("a.obj", text_c(&text));
     assert_false(
         scene_read(&scene, SCENE_OF(""),
-                   "scene.yaml:4:18: error: a.obj: polygons of too many corners: the sum of their squares is "
-                   "2415919104, more than 2147483648\n"));
+                   "scene.yaml:4:18: error: a.obj: polygons have too many corners: their squared counts sum "
+                   "to 2415919104; at most 2147483648 is allowed\n"));
 }
 
 TEST(faults_have_their_place)

@@ -125,7 +125,7 @@ TEST(far_camera_keeps_its_direction)
 TEST(color_before_sizes)
 {
     assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
-                    "3:16: warning: the color stands before the sizes\n");
+                    "3:16: warning: the color precedes the diameter and the height; accepted\n");
     OwnedScene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
     assert_number(scene.objects.items[0].as.cylinder.radius, 1);
     assert_vector(scene.materials.items[0].color, 1, 0, 0);
@@ -155,10 +155,11 @@ TEST(lenient_reads_dialects)
                              "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
                              "cy 0,0,0 0,1,0 255 , 0 , 0 1 2\n";
     OwnedText messages = scene_messages("s.rt", text, true);
-    assert_string_equal(text_c(&messages), "3:10: warning: 'ratio' is above 1; used unchanged\n"
-                                           "4:31: warning: skipped 'cb:8'\n"
-                                           "5:22: warning: skipped 'earth.xpm'\n"
-                                           "6:16: warning: the color stands before the sizes\n");
+    assert_string_equal(text_c(&messages),
+                        "3:10: warning: 'ratio' is above 1; used unchanged\n"
+                        "4:31: warning: skipped 'cb:8'\n"
+                        "5:22: warning: skipped 'earth.xpm'\n"
+                        "6:16: warning: the color precedes the diameter and the height; accepted\n");
     OwnedText source = {0};
     text_appendf(&source, "%s", text);
     OwnedMessageList list = {0};

@@ -194,7 +194,8 @@ static bool cylinder_read(RtReader *reader)
     const Word third = line_peek_vector(line);
     const bool color_first = memchr(third.text, ',', third.length) != NULL;
     if (color_first) {
-        report_warning(&reader->report, third.offset, "the color stands before the sizes");
+        report_warning(&reader->report, third.offset,
+                       "the color precedes the diameter and the height; accepted");
         if (!color_read(line, &material.color)) return false;
     }
     if (!line_number(line, "diameter", &range_positive, &diameter) ||

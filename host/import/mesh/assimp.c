@@ -340,7 +340,7 @@ static bool file_add(Importer *importer)
             importer->materials[i] = (ImportedMaterial){.scene_index = {DRAFT_NONE, DRAFT_NONE}};
     }
     if (importer->file->mNumAnimations > 0)
-        draft_warn(importer->draft, "animations are not played: nodes stand as the file has them");
+        draft_warn(importer->draft, "animations are not played: nodes keep their pose in the file");
     if (!importer->draft->import->view && importer->file->mNumCameras + importer->file->mNumLights > 0)
         draft_warn(importer->draft, "cameras and lights of a mesh are not used: those of the scene are");
     const bool added =

@@ -314,9 +314,9 @@ static bool triangles_fit(MeshDraft *draft)
         squared_corners += count * count;
     }
     if (squared_corners > squared_corners_max)
-        return draft_refuse(draft,
-                            "polygons of too many corners: the sum of their squares is %zu, more than %zu",
-                            squared_corners, squared_corners_max);
+        return draft_refuse(
+            draft, "polygons have too many corners: their squared counts sum to %zu; at most %zu is allowed",
+            squared_corners, squared_corners_max);
     if (corner_count == 0) return draft_refuse(draft, "no triangles");
     return corner_count / 3 <= TRIANGLES_MAX ||
            draft_refuse(draft, "%zu triangles, more than %d", corner_count / 3, TRIANGLES_MAX);

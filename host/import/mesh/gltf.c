@@ -264,7 +264,7 @@ bool gltf_read(MeshDraft *draft)
         gltf_open(&gltf);
         const GltfItem animations = gltf_root_member(&gltf, "animations");
         if (animations.json)
-            gltf_lose(&gltf, &animations, "animations are not played: nodes stand as the file has them");
+            gltf_lose(&gltf, &animations, "animations are not played: nodes keep their pose in the file");
         read = asset_check(&gltf) && extensions_check(&gltf) && gltf_structure_check(&gltf) &&
                gltf_scene_read(&gltf);
     }

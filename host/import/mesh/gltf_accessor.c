@@ -284,7 +284,8 @@ bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_
         return false;
     gltf->element_count += elements.count;
     if (gltf->element_count > gltf->byte_count + ELEMENTS_MAX)
-        return gltf_fails(gltf, &accessor, "nodes name so many that all have %zu elements, more than %zu",
+        return gltf_fails(gltf, &accessor,
+                          "the accessors in use have %zu elements in total; at most %zu are read",
                           gltf->element_count, gltf->byte_count + ELEMENTS_MAX);
     numbers->count = elements.count;
     numbers->items = memory_allocate_zeroed(elements.count, width * sizeof *numbers->items);

@@ -286,7 +286,7 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
 {
     const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_member(&node, "children"),
                    skin = gltf_member(&node, "skin");
-    if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "stands at two places of the scene");
+    if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "has two parents in the scene");
     if (depth > DEPTH_MAX) return gltf_fails(gltf, &node, "lies more than %d nodes deep", DEPTH_MAX);
     gltf->is_visited[index] = true;
     Affine local, affine;

@@ -75,8 +75,7 @@ static bool copies_fit(MeshDraft *draft, Mesh *mesh)
     if (i == 0) return true;
     const size_t count = scene->copied_triangle_count + mesh->triangle_count;
     if (count > COPIED_TRIANGLES_MAX)
-        return draft_refuse(draft,
-                            "named so often that its copies and others have %zu triangles, more than %d",
+        return draft_refuse(draft, "copies of mesh files have %zu triangles in total; at most %d are allowed",
                             count, COPIED_TRIANGLES_MAX);
     scene->copied_triangle_count = count;
     return true;
