@@ -37,7 +37,7 @@ void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     free(text);
 }
 
-void gltf_lose(Gltf *gltf, const GltfItem *item, const char *text)
+void gltf_warn_once(Gltf *gltf, const GltfItem *item, const char *text)
 {
     if (!report_repeats(&gltf->draft->report, NULL, 0, 0, text)) gltf_warn(gltf, item, "%s", text);
 }
@@ -264,7 +264,8 @@ bool gltf_read(MeshDraft *draft)
         gltf_open(&gltf);
         const GltfItem animations = gltf_root_member(&gltf, "animations");
         if (animations.json)
-            gltf_lose(&gltf, &animations, "animations are not played: nodes keep their pose in the file");
+            gltf_warn_once(&gltf, &animations,
+                           "animations are not played: nodes keep their pose in the file");
         read = asset_check(&gltf) && extensions_check(&gltf) && gltf_structure_check(&gltf) &&
                gltf_scene_read(&gltf);
     }

@@ -59,7 +59,7 @@ bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 // Warns about a feature that glint does not show. Only the first place with the same text is named.
-void gltf_lose(Gltf *gltf, const GltfItem *item, const char *text);
+void gltf_warn_once(Gltf *gltf, const GltfItem *item, const char *text);
 
 // Returns a member of an object or an element of an array.
 GltfItem gltf_member(const GltfItem *item, const char *key);

@@ -74,7 +74,7 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
         {item, "occlusionTexture", "occlusion textures are not used: the lights' shadows are"}};
     for (size_t i = 0; i < COUNT_OF(losses); i++) {
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
-        if (lost.json) gltf_lose(gltf, &lost, losses[i].text);
+        if (lost.json) gltf_warn_once(gltf, &lost, losses[i].text);
     }
 }
 
@@ -127,7 +127,7 @@ static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place
     wrap_read(gltf, &sampler, "wrapS", &place->wraps[0]);
     wrap_read(gltf, &sampler, "wrapT", &place->wraps[1]);
     if (json_integer_value(filter.json) == NEAREST)
-        gltf_lose(gltf, &filter, "filtering by the nearest texel is not used: texels are interpolated");
+        gltf_warn_once(gltf, &filter, "filtering by the nearest texel is not used: texels are interpolated");
 }
 
 // Reads KHR_texture_transform, which scales, rotates counterclockwise as the image is seen, with v downward,
@@ -197,7 +197,7 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surfa
     if (look->reflection.largest == 0) return;
     look->reflection.tint = color_tint(base);
     if (surface->base_texture.json)
-        gltf_lose(gltf, item, "reflections of metals do not have the colors of a texture");
+        gltf_warn_once(gltf, item, "reflections of metals do not have the colors of a texture");
 }
 
 static const char unlit_tint[] = "the factors of an emitted texture become their mean";
@@ -211,9 +211,10 @@ static bool texture_can_emit(Gltf *gltf, const GltfItem *item, GltfMaterial *mat
         gltf->draft->scene->ambient = vector_all(1);
         material->textured_ambient = ambient;
     } else {
-        gltf_lose(gltf, item,
-                  "only glint render FILE shows emission by a texture and unlit textures: lit by the lights "
-                  "instead");
+        gltf_warn_once(
+            gltf, item,
+            "only glint render FILE shows emission by a texture and unlit textures: lit by the lights "
+            "instead");
     }
     return material->texture_emits;
 }
@@ -229,7 +230,7 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
     if (surface->is_unlit) {
         if (material->texture.number > 0 && !texture_can_emit(gltf, item, material, mean_of(base))) return;
         if (material->texture.number > 0 && (base[0] != base[1] || base[1] != base[2]))
-            gltf_lose(gltf, item, unlit_tint);
+            gltf_warn_once(gltf, item, unlit_tint);
         look->emission = look->color;
         look->ambient = look->specular.largest = look->reflection.largest = 0;
         look->diffuse = vector_all(0);
@@ -246,11 +247,11 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
     if (!base_color && mean_of(base) == 0)
         texture_read(gltf, &surface->emissive_texture, TEXTURE_COLORS, &material->texture);
     if (material->texture.number == 0 || (base_color && !json_equal(emissive, base_color))) {
-        gltf_lose(gltf, item, "emission next to a different texture is not shown");
+        gltf_warn_once(gltf, item, "emission next to a different texture is not shown");
     } else if (texture_can_emit(gltf, item, material,
                                 mean_of((double[]){emission.x, emission.y, emission.z}))) {
         look->emission = emission;
-        if (!vector_is_zero(color_tint(emission))) gltf_lose(gltf, item, unlit_tint);
+        if (!vector_is_zero(color_tint(emission))) gltf_warn_once(gltf, item, unlit_tint);
     }
 }
 
@@ -275,7 +276,8 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
         material_set_opacity(look, opacity);
         material->textured_ambient *= opacity;
         if (transmission > 0)
-            gltf_lose(gltf, item, "a material that is transparent by its alpha transmits no other light");
+            gltf_warn_once(gltf, item,
+                           "a material that is transparent by its alpha transmits no other light");
     } else if (transmission > 0) {
         const Material opaque = *look;
         material_set_opacity(look, 1 - transmission);
@@ -286,7 +288,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
         look->transmission.largest *= fmin(vector_largest(look->color), 1);
         look->transmission.tint = color_tint(look->color);
         if (surface->base_texture.json)
-            gltf_lose(gltf, item, "transmitted light does not have the colors of a texture");
+            gltf_warn_once(gltf, item, "transmitted light does not have the colors of a texture");
         // without thickness a surface has no inside
         if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;
         if (surface->thickness > 0 && surface->attenuation_distance < DBL_MAX)
@@ -322,7 +324,8 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
     double(*c)[3] = color->uv_rows;
     const double area = c[0][0] * c[1][1] - c[0][1] * c[1][0];
     if (normals->uv_set != color->uv_set || area == 0) {
-        gltf_lose(gltf, &info, "the normal texture has other coordinates than the color: it is not used");
+        gltf_warn_once(gltf, &info,
+                       "the normal texture has other coordinates than the color: it is not used");
         normals->number = 0;
         return;
     }

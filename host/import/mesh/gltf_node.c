@@ -137,7 +137,7 @@ static void triangles_add(Gltf *gltf, const GltfItem *primitive, const Vertices 
 {
     const size_t count = vertices->indices.count > 0 ? vertices->indices.count : vertices->positions.count;
     if (mode == MODE_TRIANGLES ? count % 3 > 0 : count == 1 || count == 2)
-        gltf_lose(gltf, primitive, "vertices that complete no triangle are not shown");
+        gltf_warn_once(gltf, primitive, "vertices that complete no triangle are not shown");
     for (size_t i = 0; i + 2 < count; i += mode == MODE_TRIANGLES ? 3 : 1) {
         const size_t odd = mode == MODE_STRIP ? i & 1 : 0;
         triangle_add(gltf->draft, vertices, mode == MODE_FAN ? 0 : i, i + 1 + odd, i + 2 - odd);
@@ -152,14 +152,14 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     const GltfItem attributes = gltf_member(primitive, "attributes"),
                    colors = gltf_member(&attributes, "COLOR_0"), targets = gltf_member(primitive, "targets");
     if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) {
-        gltf_lose(gltf, primitive,
-                  mode < MODE_TRIANGLES ? "points and lines are not shown"
-                                        : "has no 'POSITION' and is not shown");
+        gltf_warn_once(gltf, primitive,
+                       mode < MODE_TRIANGLES ? "points and lines are not shown"
+                                             : "has no 'POSITION' and is not shown");
         return true;
     }
-    if (colors.json) gltf_lose(gltf, &colors, "vertex colors are not used: the material's color is");
+    if (colors.json) gltf_warn_once(gltf, &colors, "vertex colors are not used: the material's color is");
     if (targets.json)
-        gltf_lose(gltf, &targets, "morph targets are not applied: the mesh keeps its own shape");
+        gltf_warn_once(gltf, &targets, "morph targets are not applied: the mesh keeps its own shape");
     GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
     Vertices vertices;
     const bool read = vertices_read(gltf, primitive, material, &vertices);
@@ -168,7 +168,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
                    has_uvs = vertices.uvs.count > 0;
         const uint32_t index = gltf_material_index(gltf, material, has_texture && has_uvs);
         if (has_texture && !has_uvs)
-            gltf_lose(gltf, primitive, "the mesh lacks the texture's coordinates: it is not used");
+            gltf_warn_once(gltf, primitive, "the mesh lacks the texture's coordinates: it is not used");
         array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
     }
     if (read) {
@@ -188,7 +188,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
                    flat = gltf_member(camera, "orthographic");
     double angle = 0, aspect = 0, half_width = 0, half_height = 0;
     if (view->has_camera) {
-        gltf_lose(gltf, camera, "only the first camera is used");
+        gltf_warn_once(gltf, camera, "only the first camera is used");
         return;
     }
     gltf->is_optional = true;
@@ -273,7 +273,7 @@ static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
         gltf_fails(gltf, &extension, "the file has no lights");
     gltf->is_optional = false;
     if ((camera != SIZE_MAX || light != SIZE_MAX) && !gltf->draft->import->view) {
-        gltf_lose(gltf, node, "cameras and lights of a mesh are not used: those of the scene are");
+        gltf_warn_once(gltf, node, "cameras and lights of a mesh are not used: those of the scene are");
         return;
     }
     const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
@@ -292,7 +292,8 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     Affine local, affine;
     if (!transform_read(gltf, &node, &local)) return false;
     affine = affine_multiply(parent, &local);
-    if (skin.json) gltf_lose(gltf, &skin, "skins are not applied: the mesh keeps its own shape, at its node");
+    if (skin.json)
+        gltf_warn_once(gltf, &skin, "skins are not applied: the mesh keeps its own shape, at its node");
     view_add(gltf, &node, &affine);
     size_t mesh_index = SIZE_MAX;
     if (!gltf_index(gltf, &node, "mesh", "meshes", &mesh_index)) return false;
@@ -340,7 +341,7 @@ bool gltf_scene_read(Gltf *gltf)
         read = roots_add(gltf, &affine_identity);
     } else if (gltf_index(gltf, &root, "scene", "scenes", &index)) {
         const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_member(&scene, "nodes");
-        if (gltf_count(gltf, "scenes") > 1) gltf_lose(gltf, &scene, "only this scene is shown");
+        if (gltf_count(gltf, "scenes") > 1) gltf_warn_once(gltf, &scene, "only this scene is shown");
         for (size_t i = 0; i < json_array_size(nodes.json) && read; i++) {
             size_t node;
             read = gltf_element_index(gltf, &nodes, i, "nodes", &node) &&
