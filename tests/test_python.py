@@ -50,6 +50,17 @@ class Images(unittest.TestCase):
                             "--precision", "strict", "-o", f"{folder}/image.npy", "--quiet"], check=True)
             np.testing.assert_array_equal(image, np.load(f"{folder}/image.npy"))
 
+    def test_wrong_values(self):
+        """Values that are of the wrong type raise ValueError, and paths are texts."""
+        with self.assertRaisesRegex(glint.SceneError, "no-such-file.hdr"):
+            glint.Scene({"background": {"image": Path("no-such-file.hdr")}})
+        for wrong in {1, 2}, b"bytes", {(1, 2): 3}:
+            with self.assertRaises(ValueError):
+                glint.Scene({"background": wrong})
+        scene = glint.Scene(SPHERE)
+        with self.assertRaisesRegex(ValueError, "width: expected an integer, not 8.0"):
+            scene.render(8.0, 8)
+
     def test_overrides_and_frames(self):
         """Replaced values and a frame's values have the same effect as if the scene contained them."""
         def image(scene):

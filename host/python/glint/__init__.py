@@ -123,9 +123,21 @@ def _precision(name: str) -> int:
     return PRECISIONS[name]
 
 
+def _plain(value: Any) -> Any:
+    """Returns a path as text, and arrays and numbers of NumPy as those of Python."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"a scene cannot contain a {type(value).__name__}")
+
+
 def _yaml(value: Any) -> str:
     """Returns a value as JSON, which is YAML."""
-    return json.dumps(value, default=lambda array: array.tolist())
+    try:
+        return json.dumps(value, default=_plain)
+    except TypeError as error:
+        raise ValueError(str(error)) from None
 
 
 def _options(overrides: Optional[Mapping[str, Any]], frame: float, max_pixels: int, camera: Optional[bytes] = None) -> Any:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import operator
 import sys
 import threading
 import warnings
@@ -74,7 +75,11 @@ def pointer(array: Optional[np.ndarray]) -> Optional[int]:
 
 
 def uint32(name: str, value: int) -> int:
-    """Returns the value if it fits 32 bits, to which ctypes would truncate it."""
+    """Returns the value if it is an integer that fits 32 bits, to which ctypes would truncate it."""
+    try:
+        value = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name}: expected an integer, not {value!r}") from None
     if not 0 <= value < 1 << 32:
         raise ValueError(f"{name}: expected 0 to {(1 << 32) - 1}, not {value}")
     return value
