@@ -239,6 +239,13 @@ class Parts(TestCase):
             self.assertEqual(locate.main(["strict-1", "--reference", DEVICE]), 0)
             self.assertEqual(locate.main(["strict-1", "--reference", "no such device"]), 1)
             self.assertEqual(locate.main(["none"]), 1)
+            os.mkdir("wrong")
+            for text in "{", "[]", '{"kernel": "render"}':
+                write("wrong/launch.json", text)
+                self.assertEqual(locate.main(["wrong"]), 1)
+            self.assertEqual(locate.main(["--run", "wrong/launch.json"]), 1)
+            with unittest.mock.patch.object(locate, "report", side_effect=KeyError), self.assertRaises(KeyError):
+                locate.main(["strict-1", "--reference", DEVICE], Compiler(Mutant("sqrt")))
             for wrong in [], ["strict-1", "--unknown"]:
                 with self.assertRaises(SystemExit) as exit_of_parser:
                     locate.main(wrong)
@@ -249,7 +256,8 @@ class Parts(TestCase):
         self.assertRegex(output.getvalue(), r"^1 launch: no pixel differs between .* and .*\npixel \d+,\d+: color .*\nsample [01].*\n"
                                             r"perturb\.h:\d+, device_sqrt: sqrt, sqrt\(\{0}\)\n(  .*\n){4}found\.cl repeats it\n"
                                             r"result: ([0-9a-f]{8})\nexpected: \2\n$")
-        self.assertRegex(errors.getvalue(), 'no device "no such device"; there are: 0: .*\n.*none: no launch')
+        self.assertRegex(errors.getvalue(), 'no device "no such device"; there are: 0: .*\n.*none: no launch.*\n'
+                                            r"(.*wrong/launch\.json: not a launch that glint captured\n){3}.*: not a program that glint locate wrote")
 
 
 main()

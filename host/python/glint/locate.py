@@ -359,7 +359,10 @@ def program_write(path, finding, launch):
 def program_run(path, device):
     """Runs a program that program_write wrote. Returns its result and the expected one as lists of words."""
     text = Path(path).read_text(encoding="utf-8")
-    options, inputs, expected = (re.search(rf"(?m)^// {name}: ([^(\n]*)", text)[1] for name in ("options", "inputs", "expected"))
+    found = [re.search(rf"(?m)^// {name}: ([^(\n]*)", text) for name in ("options", "inputs", "expected")]
+    if not all(found):
+        raise Failure(f"{path}: not a program that glint locate wrote")
+    options, inputs, expected = (match[1] for match in found)
     kernel = device.kernel(text, "operation", shlex.split(options))
     result = device.buffer(bytes(128))
     kernel(device.queue, (1,), None, device.buffer(np.array([int(word, 16) for word in inputs.split()], np.uint32)), result)
@@ -429,10 +432,18 @@ def device_find(name):
     return found[0]
 
 
+def launch_read(path):
+    """Returns the launch of a file. Raises Failure if it is not one."""
+    try:
+        return Launch(path)
+    except (KeyError, TypeError, ValueError) as error:
+        raise Failure(f"{path}: not a launch that glint captured") from error
+
+
 def launches_read(folder):
     """Returns the launches of a folder that render all pixels, in the order in which they were captured. Raises Failure if there is none, or one
     at a precision at which devices may differ."""
-    launches = [Launch(path) for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
+    launches = [launch_read(path) for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
     launches = [launch for launch in launches if launch.kernel == "render" and "#define IS_PIXEL_LIST 0" in launch.text]
     if not launches:
         raise Failure(f"{folder}: no launch of the kernel render for all pixels")
@@ -491,7 +502,7 @@ def main(arguments=None, compiler=lambda text: text):
     except subprocess.CalledProcessError as error:
         print(f"glint locate: the C preprocessor failed: {error.stderr or error}", file=sys.stderr)
         return 1
-    except (Failure, cl.Error, OSError, KeyError, TypeError, instrument.ParseError, json.JSONDecodeError) as error:
+    except (Failure, cl.Error, OSError, instrument.ParseError) as error:
         print(f"glint locate: {error}", file=sys.stderr)
         return 2 if isinstance(error, cl.Error) else 1
 
