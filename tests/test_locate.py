@@ -226,6 +226,10 @@ class Parts(TestCase):
                                          _exact.Value(kind if is_number else "int", (0,)))
                     self.assertEqual(found.lanes, (bits,), f"{a!r} {operation} {b!r}")
         one, tiny = (_exact.Value("float", (int(np.float32(value).view(np.uint32)),)) for value in (1 + 2**-23, -(1 + 2**-22)))
+        half, no = _exact.Value("float", (0x3F000000,)), _exact.Value("bool", (0,))
+        self.assertEqual(_exact.exact("convert", [half], no).lanes, (1,))
+        minus, five = _exact.Value("int", (2**32 - 5,)), _exact.Value("uint", (5,))
+        self.assertIn(_exact.exact("abs", [minus], five), (None, five))
         self.assertEqual(_exact.exact("fma", [one, one, tiny], one).lanes, (int(np.float32(2**-46).view(np.uint32)),))
 
     def test_command(self):

@@ -15,7 +15,7 @@ FORMATS = {"float": ("<f", "<I", 24, -126), "double": ("<d", "<Q", 53, -1022)}  
 NAN = {"float": 0x7FC00000, "double": 0x7FF8 << 48}
 COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "!=": operator.ne}
 INTEGERS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "&": operator.and_, "|": operator.or_, "^": operator.xor, "~": operator.invert,
-            "neg": operator.neg, "abs": abs, "min": min, "max": max}
+            "neg": operator.neg, "min": min, "max": max}
 ROUNDINGS = {"floor": math.floor, "ceil": math.ceil, "trunc": math.trunc, "rint": round}
 
 
@@ -124,7 +124,7 @@ def of_lane(operation, kind, operands):
             return NAN[kind]
         return bits ^ sign if operation == "neg" else bits & ~sign | (operands[1][1] & sign if operation == "copysign" else 0)
     if operation == "convert":
-        if kind not in FORMATS and first in FORMATS and number(kind, bits_of(kind, numbers[0])) != math.trunc(numbers[0]):
+        if kind not in FORMATS and kind != "bool" and first in FORMATS and number(kind, bits_of(kind, numbers[0])) != math.trunc(numbers[0]):
             raise Undefined  # outside the integer type's range
         return bits_of(kind, numbers[0])
     if operation in ("<<", ">>"):
