@@ -147,10 +147,11 @@ static bool rows_mark(bool *is_saved, const Film *band)
     return true;
 }
 
-// Finds the records and cuts off what follows the last whole one. Does not change a file that cannot be read.
-// Returns what failed, as open_failed reports it, or NULL.
-static const char *records_find(Checkpoint *checkpoint)
+// Finds the records and cuts off what follows the last whole one, with a warning. Does not change a file that
+// cannot be read. Returns what failed, as open_failed reports it, or NULL.
+static const char *records_find(Checkpoint *checkpoint, MessageList *messages)
 {
+    struct stat status;
     bool *is_saved = memory_allocate_zeroed(checkpoint->film.row_count, sizeof *is_saved);
     Film band;
     RecordState state;
@@ -161,8 +162,14 @@ static const char *records_find(Checkpoint *checkpoint)
     }
     film_free(&band);
     free(is_saved);
-    if (state == RECORD_FAILED) return "read";
-    return ftruncate(checkpoint->descriptor, checkpoint->end) == 0 ? NULL : "write";
+    if (state == RECORD_FAILED || fstat(checkpoint->descriptor, &status) != 0) return "read";
+    if (status.st_size == checkpoint->end) return NULL;
+    if (ftruncate(checkpoint->descriptor, checkpoint->end) != 0) return "write";
+    message_warning(messages,
+                    "the last %lld bytes of the checkpoint '%s' do not begin with a whole band of the image; "
+                    "they are removed, and their rows are re-rendered",
+                    (long long)(status.st_size - checkpoint->end), checkpoint->path);
+    return NULL;
 }
 
 // Returns the value in the key's line with the name of `line`, as messages print it. The caller frees it.
@@ -301,7 +308,7 @@ Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader 
     checkpoint->film = *film;
     if (pthread_mutex_init(&checkpoint->mutex, NULL) != 0) fault("out of memory: mutex");
     bool is_open = file_open(checkpoint, messages) && head_check(checkpoint, key, messages);
-    const char *failed = is_open ? records_find(checkpoint) : NULL;
+    const char *failed = is_open ? records_find(checkpoint, messages) : NULL;
     if (failed) is_open = open_failed(path, failed, messages);
     if (!is_open) {
         checkpoint_close(checkpoint, false, messages);

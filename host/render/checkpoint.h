@@ -1,7 +1,7 @@
 // Keeps the finished bands of an image in a file, so that a render that ends early can be resumed. Records
 // are appended, each with its hash, and synced at most once a second, so that a power failure loses little
-// more than the last second. When the file is opened after a crash, a power failure or a full disk,
-// incomplete records at its end are cut off.
+// more than the last second. After a crash, a power failure or a full disk, the next process that opens
+// the file cuts off the first record that is not whole and all that follow it, with a warning.
 //
 // A checkpoint belongs to one image. Its key is a text with a line "NAME: VALUE" for each thing that the
 // image's bits depend on, the scene last, so that a refusal can name the first line that differs.
@@ -17,7 +17,8 @@ typedef struct Checkpoint Checkpoint;
 
 // Opens the file or creates it. `film` describes all rows of the image; bands that do not fit it are
 // rejected. Returns NULL with an error message, and leaves the file unchanged, if the file belongs to another
-// image, is not a checkpoint, is damaged, is used by another process, or cannot be read or written.
+// image, is not a checkpoint, is damaged before its first record, is used by another process, or cannot be
+// read or written.
 Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages);
 // Returns the rows of each band in the file, in no particular order.
 const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count);
