@@ -36,6 +36,7 @@ WORKS = (
     ("first=4096", f"{STRICT} --size {960 * SCALE}x400 --aov {ALL_AOVS}"),
     ("first=4096", f"{RENDER} --precision certified --size {960 * SCALE}x600 --samples 2"),
     ("first=4096", TRACE),
+    ("embedded", "verify S1"),
     ("buffers=8,first=4096", f"verify S1 {'M1' if IS_LONG else ''} --precision strict --lanes 1"),
 )
 # Limits: warned of, with the same bits. The statuses are CL_OUT_OF_HOST_MEMORY and CL_OUT_OF_RESOURCES.
@@ -44,6 +45,8 @@ INLINED = ("build=6", "kernel=5") if IS_LONG else ("build=6",)
 REFUSED = (
     ("embedded", f"{RENDER} --precision strict", 1, "precision strict: the device .* has the embedded profile"),
     ("embedded", f"{RENDER} --precision certified", 1, "precision certified: the device .* has the embedded profile"),
+    ("embedded", "verify S1 --precision strict", 1, "precision strict: the device .* has the embedded profile"),
+    ("no-double", "verify S1 --precision double", 1, "precision double: the device .* has no 64-bit floating point"),
     ("toward-zero", RENDER, 1, "unusable: float arithmetic rounds toward zero only"),
     ("no-infinity", RENDER, 1, "unusable: float arithmetic has no infinity and no NaN"),
     ("no-double", f"{RENDER} --precision double", 1, "precision double: the device .* has no 64-bit floating point"),

@@ -179,6 +179,27 @@ TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
     renderer_close(renderer);
 }
 
+// A reference device that fails while its arithmetic is measured must be reported by the device that it
+// serves.
+TEST(reference_device_that_fails_is_reported)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    Device other = *probe_compute.device;
+    other.passports = device_passports_open(); // empty
+    Compute compute;
+    compute_open(&compute, probe_compute.device);
+    assert_true(compute_open_reference(&compute, &other));
+    compute_fail(compute.reference, "clFinish", CL_OUT_OF_RESOURCES, "lost");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
+    settings.no_cache = true;
+    OwnedMessageList messages = {0};
+    assert_null(renderer_open_empty(&compute, &settings, NULL, &messages));
+    assert_int_equal(messages.count, 0);
+    assert_false(compute_ok(&compute));
+    compute_close(&compute);
+    device_passports_close(other.passports);
+}
+
 TEST(moved_renderer_gives_the_bits_of_a_new_one)
 {
     check_moved_renderer(false);

@@ -299,12 +299,12 @@ static Json *journal_json(const Verification *verification)
     return json;
 }
 
-// Prints why the device's arithmetic is unsuitable for a precision.
-static bool arithmetic_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
+// Returns whether the device suits a precision. If not, prints the reason.
+static bool precision_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
 {
     const RenderSettings settings = precision_settings(options, precision);
     MessageList messages = {0};
-    const bool is_suitable = arithmetic_suits(compute, &settings, &messages);
+    const bool is_suitable = device_suits(compute, &settings, &messages);
     messages_print(&messages, NULL);
     return is_suitable;
 }
@@ -315,16 +315,9 @@ static int device_verify(Verification *verification, Compute *compute)
     VerifyJournal *journal = verification->journal;
     Precision first = options->common.has_precision ? options->common.settings.precision : PRECISION_SINGLE;
     Precision last = options->common.has_precision ? options->common.settings.precision : PRECISION_DOUBLE;
-    if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
-        if (options->common.has_precision) {
-            stderr_print("precision double: the device \"%s\" has no 64-bit floating point",
-                         compute->device->name);
-            return EXIT_USER;
-        }
-        last = PRECISION_STRICT;
-    }
+    if (!options->common.has_precision && !compute->device->fp64) last = PRECISION_STRICT;
     if (options->common.has_precision && !journal->is_headed &&
-        !arithmetic_is_suitable(compute, options, first))
+        !precision_is_suitable(compute, options, first))
         return EXIT_USER;
     if (!journal->is_headed)
         text_print(verification, "%s; reference of %d bits%s\n", compute->device->name, QUAD_BITS,
@@ -337,7 +330,7 @@ static int device_verify(Verification *verification, Compute *compute)
         verification->precision = precision;
         verification->record = record;
         if (!record->is_started && !record->is_unsuitable)
-            record->is_unsuitable = !arithmetic_is_suitable(compute, options, precision);
+            record->is_unsuitable = !precision_is_suitable(compute, options, precision);
         if (!record->is_ended && !record->is_unsuitable) precision_verify(verification, compute);
         failed += records_count(record, has_failed);
     }
@@ -388,7 +381,8 @@ static void builder_start(const VerifyOptions *options)
     for (Precision precision = PRECISION_STRICT; precision <= last; precision++) {
         const VerifySettings settings = {.render = precision_settings(options, precision), .quick = true};
         VerifyKernels kernels = {0};
-        verify_run(&open.compute, &settings, &sink, &kernels);
+        if (precision_is_suitable(&open.compute, options, precision))
+            verify_run(&open.compute, &settings, &sink, &kernels);
     }
     _exit(EXIT_DONE);
 }

@@ -18,7 +18,7 @@ typedef struct {
 
 typedef struct {
     bool is_started, is_ended; // whether the first and the last line are printed
-    bool is_unsuitable;        // the device's arithmetic does not suit it; the reason is printed
+    bool is_unsuitable;        // the device does not suit it; the reason is printed
     VerifyKernels kernels;
     double start_seconds, seconds;
     CaseRecord cases[VERIFY_CASES_MAX]; // in the order of verify_case_name

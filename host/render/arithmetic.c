@@ -36,7 +36,10 @@ bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageL
         const uint32_t lanes = device_lanes(device, mode == PASSPORT_DOUBLE, settings->lanes);
         const Passport *passport =
             passport_acquire(runs, mode, lanes, needs[precision].relies, settings->no_cache);
-        if (!passport) return false;
+        if (!passport) {
+            compute_check_reference(compute); // it may be `runs` that failed
+            return false;
+        }
         Text why = {0};
         const bool is_refused = needs[precision].relies && passport_refuses(passport, &why);
         if (is_refused)
@@ -48,6 +51,12 @@ bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageL
         if (is_refused) return false;
     }
     return true;
+}
+
+bool device_suits(Compute *compute, const RenderSettings *settings, MessageList *messages)
+{
+    return compute_ok(compute) && settings_fit(settings, compute, messages) &&
+           arithmetic_suits(compute, settings, messages);
 }
 
 bool arithmetic_refuses(const Device *device, Precision precision, Text *why)

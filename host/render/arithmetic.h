@@ -13,6 +13,10 @@ const Passport *arithmetic_passport(Compute *compute, Precision precision, uint3
 // failed.
 bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageList *messages);
 
+// Returns false with a message if the settings do not fit the device (settings_fit) or its arithmetic
+// (arithmetic_suits), and false with no message if the device failed.
+bool device_suits(Compute *compute, const RenderSettings *settings, MessageList *messages);
+
 // Returns true and appends the reason to `why` if a known passport refuses the precision at the default
 // widths.
 bool arithmetic_refuses(const Device *device, Precision precision, Text *why);

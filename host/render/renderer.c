@@ -27,8 +27,7 @@ Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, 
                               MessageList *messages)
 {
     stage_begin(settings->stage, "measuring the device's arithmetic", NULL, 0);
-    if (!compute_ok(compute) || !settings_fit(settings, compute, messages) ||
-        !arithmetic_suits(compute, settings, messages)) {
+    if (!device_suits(compute, settings, messages)) {
         renderer_close(earlier);
         return NULL;
     }

@@ -173,7 +173,7 @@ static void scene_assign(const VerifyRun *run, Renderer **renderer, const Scene 
     }
     message_list_print(&messages, stderr);
     message_list_free(&messages);
-    if (!*renderer && compute_ok(run->compute)) fault("a hard case does not fit the device");
+    if (!*renderer && compute_ok(run->compute)) fault("a hard case was refused on a suitable device");
     if (*renderer) run->kernels->lanes = renderer_report(*renderer)->lanes;
 }
 
