@@ -11,7 +11,7 @@ static Random random_state;
 enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG };
 
 typedef struct {
-    size_t wrong, wrong_decided; // pixels; the latter are not listed as uncertified
+    size_t wrong, violations; // pixels; the latter are not listed as uncertified
     uint64_t rerendered, uncertified;
 } DecisionCounts;
 
@@ -27,7 +27,7 @@ static inline DecisionCounts decisions_count(const Scene *scene, const CertifySa
 {
     OwnedFilm film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(reference, &film);
-    const DecisionCounts counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
+    const DecisionCounts counted = {errors.object + errors.shadow + errors.path, errors.violations,
                                     film.rerenders.rerendered, film.rerenders.uncertified};
     return counted;
 }
@@ -53,9 +53,9 @@ static inline size_t check_image(Scene *scene, const RenderSettings *settings, c
     assert_true(certify_sample_open(&reference, scene, settings, SMALL_SIDE * SMALL_SIDE));
     OwnedFilm film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(&reference, &film);
-    if (errors.wrong_decided > 0)
+    if (errors.violations > 0)
         fail_msg("%s, %g: of the pixels not uncertified %zu are wrong, at most %zu of them in color", what,
-                 number, errors.wrong_decided, errors.color);
+                 number, errors.violations, errors.color);
     const size_t uncertified = (size_t)film.rerenders.uncertified;
     scene_free(scene);
     return uncertified;

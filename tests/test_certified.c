@@ -371,9 +371,9 @@ static void check_family(Family family)
             settings.bvh = run == 1 ? BVH_OFF : BVH_ON;
             settings.perturb_seed = run == 2 ? 1 + seed % PERTURB_SEEDS : 0;
             const DecisionCounts certified = decisions_count(&scene, &reference, &settings);
-            if (certified.wrong_decided > 0)
+            if (certified.violations > 0)
                 fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not uncertified",
-                         family_names[family], seed, run, certified.wrong, certified.wrong_decided);
+                         family_names[family], seed, run, certified.wrong, certified.violations);
             rerendered += certified.rerendered;
             uncertified += certified.uncertified;
         }
@@ -512,9 +512,9 @@ TEST(terminators_of_ovals_are_decided)
         settings.precision = PRECISION_CERTIFIED;
         settings.extra_features = CERTIFIED_FEATURES;
         const DecisionCounts certified = decisions_count(&scene, &reference, &settings);
-        if (certified.wrong_decided > 0)
+        if (certified.violations > 0)
             fail_msg("scene %u: %zu pixels are wrong, %zu of them not uncertified", seed, certified.wrong,
-                     certified.wrong_decided);
+                     certified.violations);
         rerendered += certified.rerendered;
     }
     print_message("single has %zu wrong, %.4f of the samples re-rendered\n", single_wrong,
@@ -525,7 +525,7 @@ TEST(terminators_of_ovals_are_decided)
 
 // The results of the certified images of the hard cases.
 typedef struct {
-    size_t images, compared, wrong, wrong_decided;
+    size_t images, compared, wrong, violations;
 } Pictures;
 
 static void picture_compare(void *context, const Scene *scene, const RenderSettings *settings)
@@ -536,13 +536,13 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
     const DecisionCounts found = decisions_count(scene, &reference, &certified);
-    if (found.wrong_decided > 0)
+    if (found.violations > 0)
         print_message("image %zu: %zu of %zu wrong, %zu of them not uncertified\n", pictures->images,
-                      found.wrong, reference.count, found.wrong_decided);
+                      found.wrong, reference.count, found.violations);
     pictures->images++;
     pictures->compared += reference.count;
     pictures->wrong += found.wrong;
-    pictures->wrong_decided += found.wrong_decided;
+    pictures->violations += found.violations;
 }
 
 static bool case_print(void *context, const VerifyResult *result)
@@ -562,9 +562,9 @@ TEST(hard_cases_are_decided)
     VerifyKernels kernels = {0};
     verify_run(&probe_compute, &settings, &(VerifySink){.receive = case_print}, &kernels);
     print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not uncertified\n",
-                  pictures.images, pictures.compared, pictures.wrong, pictures.wrong_decided);
+                  pictures.images, pictures.compared, pictures.wrong, pictures.violations);
     assert_true(pictures.images > 100);
-    assert_int_equal(pictures.wrong_decided, 0);
+    assert_int_equal(pictures.violations, 0);
 }
 
 // Bumps and hollows with smooth normals are lit from low and from behind, so that rays to lights start above

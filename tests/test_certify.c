@@ -146,7 +146,7 @@ TEST(there_are_no_false_alarms)
         scene.camera.shift[1] = shifts;
         CertifyUncertified uncertified;
         const CertifyErrors errors = certify(&scene, PRECISION_CERTIFIED, 1, PIXELS, &uncertified);
-        assert_int_equal(errors.wrong_decided + errors.unconfirmed + errors.contradicted, 0);
+        assert_int_equal(errors.violations + errors.unconfirmed + errors.contradicted, 0);
         assert_true(errors.compared > 6000 && uncertified.count < 600);
     }
 }

@@ -135,7 +135,7 @@ static void row_json(Json *json, Precision precision, const CertifyRow *row)
         json_addf(json,
                   "wrong_decided %zu claim %s unconfirmed %zu contradicted %zu "
                   "uncertified {pixels %zu examined %zu witnessed %zu close %zu}",
-                  errors->wrong_decided, errors->wrong_decided > 0 ? "broken" : "kept", errors->unconfirmed,
+                  errors->violations, errors->violations > 0 ? "broken" : "kept", errors->unconfirmed,
                   errors->contradicted, uncertified->count, uncertified->examined, uncertified->witnessed,
                   uncertified->close);
     json_end(json);
@@ -192,15 +192,14 @@ static int precision_compare(Certification *certification, RenderSettings settin
     return is_unfit ? EXIT_USER : is_interrupted() ? EXIT_INTERRUPTED : whole ? EXIT_DONE : EXIT_MACHINE;
 }
 
-// Returns EXIT_CHECK with a message if `certified` is wrong at a pixel that it decided.
-static int decided_check(const CertifyErrors *certified)
+// Returns EXIT_CHECK with a message if `certified` violates its claim at a pixel.
+static int violations_check(const CertifyErrors *certified)
 {
-    if (certified->wrong_decided == 0) return EXIT_DONE;
+    if (certified->violations == 0) return EXIT_DONE;
     stderr_print("certified is wrong at %zu pixel%s that it does not list as uncertified, most at %u,%u: "
                  "%.2g of the distance",
-                 certified->wrong_decided, text_plural(certified->wrong_decided),
-                 certified->wrong_decided_place[0], certified->wrong_decided_place[1],
-                 certified->wrong_decided_margin);
+                 certified->violations, text_plural(certified->violations), certified->violation_place[0],
+                 certified->violation_place[1], certified->violation_margin);
     return EXIT_CHECK;
 }
 
@@ -248,7 +247,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     if (status == EXIT_DONE && report_has_document(report) &&
         !report_write(certify_json(&certification), report))
         status = EXIT_USER;
-    if (status == EXIT_DONE) status = decided_check(&certification.rows[PRECISION_CERTIFIED].errors);
+    if (status == EXIT_DONE) status = violations_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
         free(certification.rows[i].failure);
     certify_sample_close(&certification.sample);

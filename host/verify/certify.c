@@ -108,12 +108,12 @@ static Mismatch mismatch_of(const CertifySample *sample, size_t index, const Fil
     return color_error(vector_from(film->color + 3 * pixel), expected->color) <= bound ? RIGHT : WRONG_COLOR;
 }
 
-static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], double margin)
+static void violation_add(CertifyErrors *errors, const uint32_t place[2], double margin)
 {
-    errors->wrong_decided++;
-    if (errors->wrong_decided > 1 && margin <= errors->wrong_decided_margin) return;
-    errors->wrong_decided_margin = margin;
-    memcpy(errors->wrong_decided_place, place, sizeof errors->wrong_decided_place);
+    errors->violations++;
+    if (errors->violations > 1 && margin <= errors->violation_margin) return;
+    errors->violation_margin = margin;
+    memcpy(errors->violation_place, place, sizeof errors->violation_place);
 }
 
 static void color_compare(CertifyErrors *errors, Color color, Color expected, const uint32_t place[2],
@@ -137,7 +137,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         const size_t pixel = (size_t)place[1] * film->width + place[0];
         const Mismatch mismatch = mismatch_of(sample, i, film, pixel);
         const bool claimed = film->flag[pixel] != FLAG_UNCERTIFIED;
-        if (mismatch && claimed) wrong_decided_add(&errors, place, expected->margin);
+        if (mismatch && claimed) violation_add(&errors, place, expected->margin);
         if (reference_is_uncertain(expected)) {
             errors.unconfirmed += claimed;
             errors.contradicted += claimed && mismatch;

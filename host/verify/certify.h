@@ -44,9 +44,9 @@ typedef struct {
     size_t unconfirmed, contradicted;
     // Pixels that violate the claim, because they are wrong or contradicted but not uncertified, and the one
     // with the largest margin.
-    size_t wrong_decided;
-    uint32_t wrong_decided_place[2];
-    double wrong_decided_margin;
+    size_t violations;
+    uint32_t violation_place[2];
+    double violation_margin;
 } CertifyErrors;
 
 // Compares a film, which needs AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_FLAG and the color, with the sample.

@@ -91,9 +91,9 @@ ReferenceRay verify_reference_ray(const TraceRay *ray)
     return exact;
 }
 
-bool verify_is_decided(const VerifyRun *run, const VerifyTestRay *test)
+bool verify_is_exact(const VerifyRun *run, const VerifyTestRay *test)
 {
-    return test->required.decided_tiers && strchr(test->required.decided_tiers, 'A' + (int)run->tier);
+    return test->required.exact_tiers && strchr(test->required.exact_tiers, 'A' + (int)run->tier);
 }
 
 VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyTestRay *test,
@@ -116,7 +116,7 @@ void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const
                       const TraceHit *hit)
 {
     ReferenceRay ray = verify_reference_ray(&test->ray);
-    const bool decided = verify_is_decided(run, test);
+    const bool is_exact = verify_is_exact(run, test);
     bool found = false, certain = false, wrong = false;
     for (size_t i = 0; i < count; i++) {
         ReferenceHit exact = reference_hit_object(&objects[i], &ray);
@@ -133,9 +133,9 @@ void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const
             wrong |= expected.exact.t < hit->t - expected.bound;
     }
     if (verify_is_hit(hit))
-        wrong |= decided && !found;
+        wrong |= is_exact && !found;
     else
-        wrong |= certain || (decided && found);
+        wrong |= certain || (is_exact && found);
     run->result->wrong += wrong;
 }
 

@@ -25,7 +25,7 @@ Object *verify_objects(VerifyRun *run, const Scene *scene);
 ReferenceRay verify_reference_ray(const TraceRay *ray);
 
 // Returns whether the ray must hit or miss exactly as the reference does, however near the boundary.
-bool verify_is_decided(const VerifyRun *run, const VerifyTestRay *test);
+bool verify_is_exact(const VerifyRun *run, const VerifyTestRay *test);
 // The tier's requirements for a ray and an object.
 typedef struct {
     ReferenceHit exact; // or the tangent that counts as a hit

@@ -26,10 +26,10 @@ static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const Veri
 {
     VerifyTestRay item = {{given->origin, given->direction, given->tmin, INFINITY}, *given};
     verify_round_ray(run, &item.ray);
-    if (!item.required.decided_tiers) item.required.decided_tiers = set->decided_tiers;
+    if (!item.required.exact_tiers) item.required.exact_tiers = set->exact_tiers;
     if (!item.required.limits) item.required.limits = set->limits;
     array_push(*tests, item);
-    item.required.decided_tiers = NULL;
+    item.required.exact_tiers = NULL;
     double *const moved[] = {&item.ray.origin.x, &item.ray.direction.x};
     for (size_t k = 0; k < 2; k++) {
         double x = *moved[k];
@@ -56,7 +56,7 @@ VerifyTestRays verify_test_rays(VerifyRun *run, const VerifyRays *set)
     for (size_t i = 0; set->rays && i < set->ray_count; i++)
         test_ray_add(&tests, run, set, &set->rays[i]);
     for (size_t i = 0; set->family && i < set->checked_count; i++) {
-        VerifyTestRay item = {.required = {.decided_tiers = set->decided_tiers, .limits = set->limits}};
+        VerifyTestRay item = {.required = {.exact_tiers = set->exact_tiers, .limits = set->limits}};
         verify_family(run, set->family, i, 1, &item.ray);
         array_push(tests, item);
     }

@@ -19,7 +19,7 @@ typedef struct {
 typedef struct {
     Vector3 origin, direction;
     double tmin;
-    const char *decided_tiers;  // NULL for those of the set
+    const char *exact_tiers;    // NULL for those of the set
     const VerifyLimits *limits; // NULL for those of the set
     double tangent_t;           // t of a tangent, which counts as a hit, or 0
 } VerifyRay;
@@ -35,14 +35,14 @@ typedef struct {
     bool closed;          // every ray of the family hits something
     // The tiers, as in "BCD", that require the exact hit or miss, however near the boundary. For a table of
     // rays this excludes the neighbors.
-    const char *decided_tiers;
+    const char *exact_tiers;
     const VerifyLimits *limits; // or NULL
 } VerifyRays;
 
 extern const VerifyRays verify_rays[];
 extern const size_t verify_rays_count;
 
-// A ray as it is traced, and the requirements for its hit. A neighbor of a table's ray has no decided tiers.
+// A ray as it is traced, and the requirements for its hit. A neighbor of a table's ray has no exact tiers.
 typedef struct {
     TraceRay ray;
     VerifyRay required;

@@ -107,7 +107,7 @@ static void test_ray_print(bool is_double, const Object *objects, size_t count, 
         VerifyExpected expected = verify_expected(&run, &objects[nearest], test, hit);
         printf("%s\"%c\": {\"open\": %s, \"decided\": %s, \"touch\": %s, \"bound\": %.17g}",
                tier % TIER_D > 0 ? ", " : "", 'A' + (int)tier, json_of(expected.open),
-               json_of(verify_is_decided(&run, test)), json_of(expected.exact.found && !hit.found),
+               json_of(verify_is_exact(&run, test)), json_of(expected.exact.found && !hit.found),
                fmin(expected.bound, DBL_MAX));
     }
     printf("}}\n");
