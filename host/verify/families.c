@@ -263,7 +263,7 @@ TraceRay family_from_within(uint64_t i)
 void scene_far_sphere(Scene *scene)
 {
     enum { ROWS = 50, COLUMNS = 50 };
-    static Vector3 points[ROWS + 1][COLUMNS];
+    Vector3 points[ROWS + 1][COLUMNS];
     for (unsigned row = 0; row <= ROWS; row++)
         for (unsigned column = 0; column < COLUMNS; column++) {
             double down = M_PI * row / ROWS, around = 2 * M_PI * column / COLUMNS;

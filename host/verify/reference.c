@@ -56,9 +56,10 @@ Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shin
 Object reference_round_object(const Object *object)
 {
     Object result = *object;
-    Vector3 *points = (Vector3 *)(void *)&result.as, end = vector_add(points[0], points[1]);
+    Vector3 *points = (Vector3 *)(void *)&result.as;
     bool finite = (object->type == SHAPE_CYLINDER && object->as.cylinder.finite) ||
                   (object->type == SHAPE_CONE && object->as.cone.finite);
+    Vector3 end = finite ? vector_add(points[0], points[1]) : points[0];
     round_numbers(&points[0].x, reference_shapes[object->type]->number_count);
     round_numbers(&end.x, 3);
     if (finite) points[1] = vector_subtract(end, points[0]);

@@ -81,8 +81,8 @@ static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned g
 static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, size_t sphere,
                          const TraceHit *first)
 {
-    static TraceRay rays[2 * DIRECTIONS];
-    static TraceHit hits[2 * DIRECTIONS];
+    TraceRay rays[2 * DIRECTIONS];
+    TraceHit hits[2 * DIRECTIONS];
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         Vector3 direction = sample_unit_vector(64, sphere * DIRECTIONS + i, 0);
         if (vector_dot(direction, first->normal) < 0) direction = vector_scale(direction, -1);
@@ -142,7 +142,7 @@ void verify_points_on_faces(VerifyRun *run)
 void verify_coincident_faces(VerifyRun *run)
 {
     enum { COUNT = 1200, COINCIDENT = 6 };
-    static TraceRay rays[COUNT];
+    TraceRay *rays = verify_allocate(run, COUNT, sizeof *rays);
     const TraceHit *alone[COINCIDENT];
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 origin = {0.5, sample_number(7, i, 0), sample_number(7, i, 1)}, direction = {1, 0, 0};
