@@ -26,8 +26,8 @@ class Errors(unittest.TestCase):
                 (lambda: glint.Scene({"objects": []}), "lacks 'camera'"), (lambda: glint.Scene("objects: ["), "scene.yaml:1"),
                 (lambda: glint.load("missing.yaml"), "missing.yaml.*No such file"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES + 1), "no vertex 8 of 8"),
-                (lambda: glint.load_mesh(CUBE_VERTICES * np.nan, CUBE_FACES), "vertex 0"),
-                (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES, CUBE_VERTICES * np.nan), "normal 0"),
+                (lambda: glint.load_mesh(CUBE_VERTICES * np.nan, CUBE_FACES), r"vertex 0 is \(-?nan, -?nan, -?nan\)"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES, CUBE_VERTICES * np.nan), r"normal 0 is \(-?nan, "),
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES[:0]), "1 to"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, -CUBE_FACES), "no vertex -7"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, [[1 << 32, (1 << 32) + 1, 2]]), "no vertex 4294967297"),
@@ -35,7 +35,12 @@ class Errors(unittest.TestCase):
                 (lambda: glint.Scene(SPHERE).render(8, 6, device="toaster"), "toaster"),
                 (lambda: glint.Scene(SPHERE).render(8, 6, lanes=3), "lanes"),
                 (lambda: glint.Scene(SPHERE).render(1 << 21, 6), "pixels per side"),
-                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 0]]), "ray 0"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 0]]), "ray 0: a ray.s direction cannot be 0 0 0"),
+                (lambda: glint.Scene(SPHERE).trace([[0, np.inf, 0]], [[0, 0, 1]]), "ray 0: the origin is not finite"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 1e39, 0]], [[0, 0, 1]]), "the origin is beyond the range of float; use precision double"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, np.nan]]), "the direction is not finite"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], tmin=np.inf), "tmin is not finite"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], tmax=np.nan), "tmax is not a number"),
                 (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], precision="certified", tmin=1), "tmin must be 0")):
             with self.assertRaisesRegex(glint.SceneError, words):
                 make()

@@ -126,7 +126,9 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
     struct_write(hits, &found, sizeof found);
     bool is_sound = rays_read(&given, rays, &list);
     if (is_sound && tracer->precision == PRECISION_CERTIFIED)
-        is_sound = message_error(&list, "all hits have no bounds: trace them at another precision");
+        is_sound =
+            message_error(&list, "precision certified cannot trace all hits, because its bounds hold only "
+                                 "for rays from their origins; use single, strict or double");
     if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     pthread_mutex_lock(&tracer->device->mutex);
     is_sound = rays_trace_all(tracer, &given, hits_max, &found, &list);

@@ -98,7 +98,7 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
                             .real_size = sizeof(double)};
     const unsigned aovs = layers_set(&rendering.film, &arrays);
     if (!arrays.color) {
-        message_error(&list, "an image needs an array for its color");
+        message_error(&list, "GlintImage.color must not be NULL");
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     }
     pthread_mutex_lock(&device->mutex);

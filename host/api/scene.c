@@ -70,7 +70,9 @@ static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, si
     numbers_widen((double *)vectors, reals, 3 * count, real == GLINT_FLOAT64);
     for (size_t i = 0; i < count; i++)
         if (!vector_is_within(vectors[i], NUMBER_MAX))
-            return message_error(messages, "%s %zu: expected numbers up to %g", noun, i, NUMBER_MAX);
+            return message_error(messages,
+                                 "%s %zu is (%g, %g, %g); expected finite numbers of at most %g in size",
+                                 noun, i, vectors[i].x, vectors[i].y, vectors[i].z, NUMBER_MAX);
     return true;
 }
 

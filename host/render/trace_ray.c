@@ -17,9 +17,12 @@ static double farthest_of(Precision precision)
 
 const char *trace_ray_why_not(const TraceRay *ray, Precision precision)
 {
-    if (!vector_is_within(ray->origin, farthest_of(precision)) ||
-        !vector_is_within(ray->direction, DBL_MAX) || !isfinite(ray->tmin) || isnan(ray->tmax))
-        return "a number is not finite or beyond the precision's range; only tmax may be infinite";
+    if (!vector_is_within(ray->origin, DBL_MAX)) return "the origin is not finite";
+    if (!vector_is_within(ray->origin, farthest_of(precision)))
+        return "the origin is beyond the range of float; use precision double or certified";
+    if (!vector_is_within(ray->direction, DBL_MAX)) return "the direction is not finite";
+    if (!isfinite(ray->tmin)) return "tmin is not finite";
+    if (isnan(ray->tmax)) return "tmax is not a number";
     if (vector_is_zero(ray->direction)) return "a ray's direction cannot be 0 0 0";
     return precision == PRECISION_CERTIFIED && ray->tmin != 0 ? "at certified, tmin must be 0" : NULL;
 }
