@@ -305,7 +305,7 @@ for line in worker.stdout:
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=set_back)["runs"]
         self.assertEqual(row["energy"]["reason"], "the energy counter did not change or could not be read")
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=board)["runs"]
-        self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML, NVIDIA's library, is not available"})
+        self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML, which measures NVIDIA boards, is not available"})
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_variant(self):

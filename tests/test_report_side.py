@@ -106,8 +106,8 @@ class SideBySide(TestCase):
         unknown = report(run(5))
         del unknown["host"]
         for other, reason in [(report(run(5), name="gpu-x"), "another device"), (boarded, "another board"),
-                              (report(run(5), host="there"), "another host"), (report(run(5), rounds=7), "another calibration or none"),
-                              (uncalibrated, "another calibration or none"), (unknown, "the host of one of the reports is unknown"), (short, "too few runs"),
+                              (report(run(5), host="there"), "another host"), (report(run(5), rounds=7), "it has another calibration or none"),
+                              (uncalibrated, "it has another calibration or none"), (unknown, "the host of one of the reports is unknown"), (short, "too few runs"),
                               (summarized, "too few runs")]:  # fmt: skip
             with self.subTest(reason):
                 out, data = self.compared(older, other)
@@ -118,6 +118,7 @@ class SideBySide(TestCase):
                 self.assertRegex(out, f"no verdicts?,? since .*{reason}")
                 self.assertRegex(out, r"(?m)  0\.500(, no verdict since .*)?$")
         scrubbed = report(run(10), host="HOST")  # as glint report writes it
+        self.assertIn("the first report has another calibration or none", self.compared(uncalibrated, older)[0])
         self.assertIn("the host of one of the reports is unknown", self.compared(scrubbed, scrubbed)[0])
         self.assertNotIn("lower_quartile", self.compared(older, summarized)[1]["rows"][0]["cells"][1]["frame_ms"])
 

@@ -237,7 +237,7 @@ const char *baselines_why_not_compared(const Baseline *newer, const Baseline *ol
     if (strcmp(newer->board, older->board) != 0) return "it was measured on another board";
     if (!host_is_known(newer) || !host_is_known(older)) return "the host of one of the reports is unknown";
     if (strcmp(newer->host, older->host) != 0) return "it was measured on another host";
-    if (!newer->is_calibrated || !older->is_calibrated)
-        return "it or the first report has another calibration or none";
+    if (!newer->is_calibrated) return "it has another calibration or none";
+    if (!older->is_calibrated) return "the first report has another calibration or none";
     return NULL;
 }

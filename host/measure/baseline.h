@@ -43,5 +43,6 @@ bool bench_key_equal(const BenchKey *a, const BenchKey *b);
 // the baseline lacks the row.
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);
 
-// Returns why no claim can be made about which report's rows are faster, or NULL if it can.
+// Returns why no claim can be made about which report's rows are faster, or NULL if it can. The text calls
+// the newer report "it" and the older one "the first report".
 const char *baselines_why_not_compared(const Baseline *newer, const Baseline *older);

@@ -14,7 +14,7 @@
 typedef struct {
     char *path;     // of the counter's file; NULL for the board
     uint64_t last;  // microjoules
-    uint64_t range; // after which the counter starts at 0; 0 if it does not
+    uint64_t range; // the counter restarts at 0 after this value; 0 if it never does
 } EnergyCounter;
 
 // The functions of NVML that are used, by the names and types of nvml.h. They return 0 for success.
@@ -103,7 +103,7 @@ static const char *board_add(EnergyMeter *meter, const char *pci)
         !function_find(nvml->library, "nvmlDeviceGetTotalEnergyConsumption", &nvml->total_energy) ||
         !function_find(nvml->library, "nvmlShutdown", &nvml->shutdown) || init() != 0) {
         nvml->shutdown = NULL;
-        return "NVML, NVIDIA's library, is not available";
+        return "NVML, which measures NVIDIA boards, is not available";
     }
     const bool is_read = find(pci, &nvml->board) == 0 && counter_add(meter, NULL, 0);
     return is_read ? NULL : "NVML does not report this board's energy";
@@ -117,7 +117,7 @@ EnergyMeter *energy_open(const Device *device, const char **why_not)
     else if (device->type & CL_DEVICE_TYPE_CPU)
         *why_not = packages_add(meter);
     else
-        *why_not = "no energy counter is known for such a device";
+        *why_not = "glint reads the energy of NVIDIA boards and of CPUs only";
     if (!*why_not) return meter;
     energy_close(meter);
     return NULL;

@@ -247,7 +247,7 @@ void pilot_describe(Text *text, const Pilot *pilot)
         for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
             is_kept = is_kept || (i != PRECISION_DOUBLE && pilot->candidates[i].verdict.keeps);
         text_appendf(text,
-                     is_kept ? "none that keeps %s within %g is faster"
+                     is_kept ? "no precision that keeps %s within %g is faster"
                              : "no faster precision is known to keep %s within %g",
                      error_metric_names[budget->metric], budget->limit);
     } else if (budget->metric == ERROR_MAX) {
@@ -255,13 +255,15 @@ void pilot_describe(Text *text, const Pilot *pilot)
             text, "largest error in the sample %.2g; with %g%% confidence at most %.2g%% of pixels exceed %g",
             verdict->error, percent, 100 * verdict->bound, budget->limit);
     } else {
-        text_appendf(text, "%s %sat most %.2g with %g%% confidence", error_metric_names[budget->metric],
-                     budget->metric == ERROR_FLIP ? "estimated as " : "", verdict->bound, percent);
+        text_appendf(text,
+                     budget->metric == ERROR_FLIP ? "%s at most %.2g (estimated, %g%% confidence)"
+                                                  : "%s at most %.2g with %g%% confidence",
+                     error_metric_names[budget->metric], verdict->bound, percent);
     }
     text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
     if (budget->metric != ERROR_RMSE) return;
     if (pilot->color_max <= DBL_MAX)
         text_appendf(text, ", colors up to %.3g", pilot->color_max);
     else
-        text_appendf(text, ", which give no bound on the RMSE: a light that fades may have any brightness");
+        text_appendf(text, "; the RMSE has no bound, because a fading light has no greatest brightness");
 }
