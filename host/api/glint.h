@@ -7,7 +7,9 @@
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
 // can add members. Members beyond the caller's size are read as 0. A member that this version of the library
-// does not have must be 0, or the call is refused. Pointers must not be NULL unless a comment permits it.
+// does not have must be 0, or the call is refused. In structs that the library fills, members beyond the
+// caller's size are not written, and members that this version does not have are set to 0. Pointers must not
+// be NULL unless a comment permits it.
 //
 // A scene does not depend on a device; a tracer needs its device. A device serves one call at a time, and
 // calls from other threads wait. Calls only read a scene, so several threads may use it at once. Listing
@@ -106,7 +108,7 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
 // Triangles in memory. A triangle's index is its object in hits and images.
 typedef struct {
     size_t size;
-    GlintReal real;            // of vertices and normals
+    GlintReal real;            // the type of vertices and normals
     const void *vertices;      // 3 per vertex
     const void *normals;       // 3 per vertex, for smooth shading, or NULL; zero normals mean flat shading
     size_t vertex_count;       // at most 4294967295
@@ -136,9 +138,9 @@ typedef int (*GlintProgress)(void *context, double fraction_done);
 
 typedef struct {
     size_t size;
-    uint32_t width, height; // both 0 select glint_scene_image_size
-    uint32_t samples;       // per pixel; 0 means 1
-    uint32_t bounces;       // the maximum per ray
+    uint32_t width, height; // 1 to 1048576; both 0 select glint_scene_image_size
+    uint32_t samples;       // per pixel, 1 to 1048576; 0 means 1
+    uint32_t bounces;       // the maximum per ray, 0 to 255
     GlintPrecision precision;
     uint32_t lanes;          // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
     GlintProgress progress;  // or NULL
@@ -186,7 +188,7 @@ void glint_tracer_close(GlintTracer *tracer); // accepts NULL
 typedef struct {
     size_t size;
     size_t count;
-    GlintReal real;         // of the arrays
+    GlintReal real;         // the arrays' type
     const void *origins;    // 3 per ray
     const void *directions; // 3 per ray
     const void *tmin;       // 1 per ray; NULL means 0; at GLINT_CERTIFIED every tmin must be 0
@@ -204,7 +206,7 @@ typedef enum {
 typedef struct {
     size_t size;
     uint32_t *object;
-    double *t;          // of the nearest hit, in lengths of the direction
+    double *t;          // the nearest hit's t, in lengths of the direction
     double *low, *high; // bounds on the exact t where certain, otherwise t
     double *normal;     // 3 per ray: geometric, unit, facing the ray
     double *position;   // 3 per ray: the hit point, moved onto the surface
@@ -235,7 +237,7 @@ GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, Gl
 // Hits of many rays, sorted by ray and then by t. The library allocates the arrays.
 typedef struct {
     size_t size;
-    size_t count;     // of all hits
+    size_t count;     // the number of hits
     size_t *ray;      // the index of each hit's ray
     uint32_t *object; // this and the following members are as in GlintHits
     double *t;
@@ -243,10 +245,10 @@ typedef struct {
     double *position;
 } GlintAllHits;
 
-// Finds up to hits_max hits of each ray, nearest first. If several hits have the same t, it finds one. The
-// caller sets hits->size; the other members are overwritten and must not hold arrays of an earlier call.
-// glint_all_hits_free frees the arrays. After a failure there are none, and count is 0. GLINT_CERTIFIED is
-// refused, because its bounds are those of rays from their origins.
+// Finds up to hits_max hits of each ray, or all for SIZE_MAX, nearest first. If several hits have the same t,
+// it finds one. The caller sets hits->size; the other members are overwritten and must not hold arrays of an
+// earlier call. glint_all_hits_free frees the arrays. After a failure there are none, and count is 0.
+// GLINT_CERTIFIED is refused, because its bounds are those of rays from their origins.
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
                             char **messages);
 void glint_all_hits_free(GlintAllHits *hits); // accepts NULL
@@ -258,7 +260,7 @@ void glint_all_hits_free(GlintAllHits *hits); // accepts NULL
 // such as t.
 typedef struct {
     size_t size;
-    GlintReal real; // of both arrays
+    GlintReal real; // the type of both arrays
     uint32_t width, height, channels;
     const void *reference;
     const void *image;

@@ -1,5 +1,4 @@
-// Renders a compiled scene on a device in bands, or traces explicit rays through it. Among the rooms of the
-// host, only this one uses both scenes and OpenCL.
+// Renders a compiled scene on a device in bands, or traces explicit rays through it.
 #pragma once
 
 #include "host/compile/compiled_scene.h"
@@ -12,8 +11,8 @@ typedef struct Renderer Renderer;
 
 // Opens a renderer on a device, whose Compute must outlive it. Kernels are built when first used. Returns
 // NULL with a message if a number of the scene does not fit the precision, if the settings do not fit the
-// device (double without fp64, certified if its reference device lacks fp64, lanes other than 1, 4, 8 or 16)
-// or if the scene does not fit its memory, and NULL with no message if the device failed.
+// device (settings_fit) or its arithmetic (arithmetic_suits) or if the scene does not fit its memory, and
+// NULL with no message if the device failed.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
 // Opens a renderer as renderer_open does. Closes `earlier`, NULL or an earlier renderer of the device, and
@@ -22,7 +21,7 @@ Renderer *renderer_reopen(Renderer *earlier, Compute *compute, const Scene *scen
                           const RenderSettings *settings, MessageList *messages);
 // Opens a renderer that has no scene. The caller then calls renderer_receive_scene with the scene of each
 // pass. Treats `earlier` as renderer_reopen does. Returns NULL with a message if the settings do not fit the
-// device, and NULL with no message if the device failed.
+// device or its arithmetic, and NULL with no message if the device failed.
 Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
                               MessageList *messages);
 // Returns the lanes of a pass, or 0 if the renderer does not have that pass.
