@@ -1,6 +1,7 @@
 #include "host/api/handles.h"
 
 #include "host/base/memory.h"
+#include "host/base/numbers.h"
 #include "host/base/parallel.h"
 #include <math.h>
 #include <stdlib.h>
@@ -42,9 +43,9 @@ void glint_tracer_close(GlintTracer *tracer)
 
 static void reals_read(double *values, size_t count, GlintReal real, const void *reals, size_t first)
 {
-    for (size_t i = 0; i < count; i++)
-        values[i] = real == GLINT_FLOAT32 ? (double)((const float *)reals)[first + i]
-                                          : ((const double *)reals)[first + i];
+    const bool is_double = real == GLINT_FLOAT64;
+    const size_t size = is_double ? sizeof(double) : sizeof(float);
+    numbers_widen(values, (const char *)reals + first * size, count, is_double);
 }
 
 static void ray_read(TraceRay *ray, const GlintRays *rays, size_t index)
