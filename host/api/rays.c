@@ -99,7 +99,7 @@ bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t 
                       .mutex = PTHREAD_MUTEX_INITIALIZER,
                       .wrong = SIZE_MAX};
     batch.exponents = exponents; // in the initializer, clang-tidy 14 would not see that it is written to
-    parallel_run(count, RAYS_OF_THREAD_MIN, ray_batch_scale, &batch);
+    parallel_run(count, RAYS_PER_THREAD_MIN, ray_batch_scale, &batch);
     return !batch.reason || message_error(messages, "ray %zu: %s", batch.wrong, batch.reason);
 }
 
@@ -162,7 +162,7 @@ static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const Trac
         is_sound = rays_scale(scaled, exponents, rays, first, count, tracer->precision, messages) &&
                    renderer_trace_closest(tracer->renderer, scaled, count, found);
         HitBatch hits = {arrays, first, found, exponents};
-        if (is_sound) parallel_run(count, RAYS_OF_THREAD_MIN, hit_batch_write, &hits);
+        if (is_sound) parallel_run(count, RAYS_PER_THREAD_MIN, hit_batch_write, &hits);
     }
     free(exponents);
     free(found);

@@ -47,7 +47,7 @@ Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count);
 typedef struct {
     const char *source;     // what measured it; NULL if it was not measured
     const char *why_not;    // why it was not measured
-    double joules, seconds; // of one frame
+    double joules, seconds; // per frame
 } BenchEnergy;
 
 // Identifies a row. The scene is known by its path and by the hash of all files it was read from; rows of

@@ -62,9 +62,9 @@ enum { FLAG_RERENDERED = 1, FLAG_UNCERTIFIED };
 // relative to the eye. A path is a signature of the surfaces that the ray tree hits (kernels/types.h).
 typedef struct {
     uint32_t width, height, light_count;
-    uint32_t first_row; // of the band, counted in the region
-    // The number of samples in the color, which is their sum until it has all of them and then their mean. 0
-    // unless the film was delivered as a band.
+    uint32_t first_row; // the band's, counted in the region
+    // The number of samples in the color, which is their sum until all are in and then their mean. 0 for a
+    // film that is not a delivered band, and for a band that is read from a checkpoint.
     uint32_t samples;
     bool is_double;   // whether it was computed in double
     size_t real_size; // sizeof(float) in a band that was computed in float, else sizeof(double)

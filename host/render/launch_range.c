@@ -30,7 +30,7 @@ TileShape group_shape(const Pass *pass)
 
 static size_t divide_up(size_t count, size_t by)
 {
-    return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
+    return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): by > 0
 }
 
 LaunchRange launch_range_of_rows(const Pass *pass, BandRows rows)

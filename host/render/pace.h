@@ -11,7 +11,7 @@
 // pace_launch_samples and pace_record_launch surround each of its launches.
 typedef struct {
     double target_seconds;                 // the intended duration of a launch
-    double samples_min;                    // of a launch; fewer take the same time
+    double samples_min;                    // a launch with fewer takes the same time
     double launch_samples, launch_seconds; // the last launch
     double sweep_samples, sweep_seconds;   // the current sweep so far
     double band_samples, band_seconds;     // the current band so far

@@ -13,8 +13,8 @@ typedef struct {
     RenderSettings settings;
     uint32_t lanes;
     bool certifies;           // whether its kernels bound their errors and flag pixels for the next pass
-    const Passport *passport; // of its kernels
-    RenderReport *report;     // of all passes; describes the scene and kernels of the first
+    const Passport *passport; // describes the arithmetic of its kernels
+    RenderReport *report;     // shared by all passes; describes the scene and kernels of the first
     DeviceScene scene;
     Kernels kernels;
     cl_mem sample_offsets; // positions in the pixel

@@ -126,13 +126,13 @@ static void trace_batch(Pass *pass, KernelType type, const TraceRay *rays, size_
            objects = buffer_pool_acquire(&pass->pool, compute, object_size);
     TraceBatch batch = {pass, type, rays, hits};
     batch.ray_scalars = pass_map(pass, ray_buffer, 0, ray_size, CL_MAP_WRITE_INVALIDATE_REGION);
-    if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
+    if (compute_ok(compute)) parallel_run(count, RAYS_PER_THREAD_MIN, rays_write, &batch);
     compute_unmap(compute, ray_buffer, batch.ray_scalars);
     const double seconds = trace_launch(pass, type, (uint32_t)count, ray_buffer, results, objects);
     pace_record_launch(&pass->kernels.paces[type], count, seconds);
     batch.result_scalars = pass_map(pass, results, 0, result_size, CL_MAP_READ);
     batch.objects = pass_map(pass, objects, 0, object_size, CL_MAP_READ);
-    if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, hits_read, &batch);
+    if (compute_ok(compute)) parallel_run(count, RAYS_PER_THREAD_MIN, hits_read, &batch);
     compute_unmap(compute, results, batch.result_scalars);
     compute_unmap(compute, objects, batch.objects);
     compute_try(compute, clFinish(compute->queue));

@@ -37,7 +37,8 @@ typedef struct {
     double light;        // transmittance along the ray from tmin to tmax
 } TraceHit;
 
-enum { RAYS_OF_THREAD_MIN = 4096 }; // of work on the host, a few tenths of a millisecond
+// Fewer rays are not worth a thread, because the host converts these in a few tenths of a millisecond.
+enum { RAYS_PER_THREAD_MIN = 4096 };
 
 // Returns the ray with its direction divided by 2^*exponent, and its tmin and tmax multiplied by that, so
 // that the direction's largest component lies in 0.5 to 1 and its squared length neither underflows nor

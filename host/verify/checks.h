@@ -30,7 +30,7 @@ bool verify_is_exact(const VerifyRun *run, const VerifyTestRay *test);
 typedef struct {
     ReferenceHit exact; // or the tangent that counts as a hit
     bool open;          // whether the margin permits both hit and miss
-    double bound;       // of the error of t, in units of t
+    double bound;       // bounds the error of t, in units of t
 } VerifyExpected;
 
 VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyTestRay *test,

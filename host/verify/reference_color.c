@@ -35,7 +35,7 @@ typedef struct {
     double blur;
     Random random;
     Color sum;
-    uint32_t object;    // of the first hit, UINT32_MAX before it
+    uint32_t object;    // the first hit's, UINT32_MAX before it
     double distance;    // to the first hit
     uint32_t signature; // see kernels/types.h
     double margin;

@@ -42,10 +42,10 @@ typedef struct {
     size_t wrong_normals; // normals that are not the surface's
     size_t differing;     // answers whose bits depend on something irrelevant
     double worst, bound;  // the error with the largest ratio to its bound, both 0 without one
-    const char *unit;     // of both
+    const char *unit;     // the unit of worst and bound
     double worst_position_ratio,
         worst_normal_ratio; // the largest errors of points and normals over their bounds
-    uint64_t hash;          // of the bits of all answers, in order
+    uint64_t hash;          // hashes the bits of all answers, in order
 } VerifyResult;
 
 bool verify_holds(const VerifyResult *result);
