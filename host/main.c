@@ -57,17 +57,20 @@ static bool path_has(const char *name)
 }
 
 // Starts glint-NAME if there is such a program on the PATH, as git does: the Python package has glint-locate.
-static void program_start(const char *name, char **arguments)
+// Returns whether there is one, or what it belongs to is known, with a message.
+static bool program_start(const char *name, char **arguments)
 {
-    if (strchr(name, '/')) return;
+    if (strchr(name, '/')) return false;
     char *program = text_format("glint-%s", name);
     execvp(program, arguments);
     const int error = errno; // which may be that of a folder of the PATH that cannot be searched
-    if (path_has(program))
+    const bool exists = path_has(program), is_locate = strcmp(name, "locate") == 0;
+    if (exists)
         stderr_print("cannot start %s: %s", program, strerror(error));
-    else if (strcmp(name, "locate") == 0)
+    else if (is_locate)
         stderr_print("glint locate needs glint's Python package with the extra [locate]");
     free(program);
+    return exists || is_locate;
 }
 
 static int command_run(int argument_count, char **arguments)
@@ -101,7 +104,7 @@ static int command_run(int argument_count, char **arguments)
         arguments[0] = render_name;
         return command_render(argument_count, arguments);
     }
-    program_start(name, arguments + 1);
+    if (program_start(name, arguments + 1)) return EXIT_USER;
     const char *near = text_nearest(name, names, COMMAND_COUNT);
     stderr_print("unknown command \"%s\"%s%s%s", name, near ? "; did you mean " : "", near ? near : "",
                  near ? "?" : "");

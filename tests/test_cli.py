@@ -105,7 +105,11 @@ class Commands(TestCase):
         write("file", "")
         self.refuses("rendr", rf"\A{unknown}", env={"PATH": os.path.abspath("file")})
         write("glint-rendr", "")
-        self.refuses("rendr", rf"\Aglint: cannot start glint-rendr: Permission denied\n{unknown}", env={"PATH": f"{os.getcwd()}:/none"})
+        self.refuses("rendr", r"\Aglint: cannot start glint-rendr: Permission denied\n\Z", env={"PATH": f"{os.getcwd()}:/none"})
+        os.symlink("loop", "loop")
+        os.chmod(write("glint-loop", "#!./loop\n"), 0o755)
+        self.refuses("loop", r"\Aglint: cannot start glint-loop: .*\n\Z", env={"PATH": os.getcwd()})
+        self.refuses("locate", r"\Aglint: glint locate needs .*\n\Z", env={"PATH": os.getcwd()})
 
     def test_help_lists_the_precisions_that_are_accepted(self):
         for command, arguments in PRECISION_COMMANDS.items():
