@@ -140,14 +140,16 @@ static bool worker_open(MeasuredProgram *worker, const Against *against)
 {
     worker->errors = tmpfile();
     int to[2] = {-1, -1}, from[2] = {-1, -1};
-    bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0;
+    bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0 &&
+                 (worker->requests = fdopen(to[1], "w")) != NULL &&
+                 (worker->replies = fdopen(from[0], "r")) != NULL;
     if (!ready) stderr_print("cannot run '%s': %s", worker->name, strerror(errno));
     bool spawned = ready && worker_spawn(worker, against->options, to, from);
     if (to[0] >= 0) close(to[0]);
     if (from[1] >= 0) close(from[1]);
-    if (to[1] >= 0) worker->requests = fdopen(to[1], "w");
-    if (from[0] >= 0) worker->replies = fdopen(from[0], "r");
-    return spawned && worker->requests && worker->replies && worker_greets(worker, against->set->count);
+    if (to[1] >= 0 && !worker->requests) close(to[1]);
+    if (from[0] >= 0 && !worker->replies) close(from[0]);
+    return spawned && worker_greets(worker, against->set->count);
 }
 
 // Reads one line of times.
