@@ -263,4 +263,21 @@ TEST(fault_removes_the_temporary)
     unlink("kept");
 }
 
+// Where no unnamed file was possible, the process that opened a file can commit it after a child has ended.
+TEST(forked_process_keeps_the_temporary)
+{
+    MessageList messages = {0};
+    OutputFile output;
+    unnamed_are_refused = true;
+    assert_true(output_open(&output, "new", &messages));
+    const pid_t child = fork();
+    if (child == 0) exit(EXIT_DONE);
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    assert_true(output_write(&output, "new", 3, &messages));
+    assert_true(output_commit(&output, &messages));
+    unnamed_are_refused = false;
+    check_content("new", "new");
+    unlink("new");
+}
+
 TEST_MAIN(folder_open, folder_close)

@@ -24,7 +24,7 @@ static void pending_remove_all(void)
 {
     pthread_mutex_lock(&pending_mutex);
     for (; pending; pending = pending->next_pending)
-        unlinkat(pending->folder, pending->temporary, 0);
+        if (pending->process == getpid()) unlinkat(pending->folder, pending->temporary, 0);
     pthread_mutex_unlock(&pending_mutex);
 }
 
@@ -40,6 +40,7 @@ static void pending_add(OutputFile *output, char *temporary)
     pthread_once(&once, exit_handler_register);
     pthread_mutex_lock(&pending_mutex);
     output->temporary = temporary;
+    output->process = getpid();
     output->next_pending = pending;
     pending = output;
     pthread_mutex_unlock(&pending_mutex);

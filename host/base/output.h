@@ -6,6 +6,7 @@
 #include "host/base/message.h"
 #include <stdbool.h>
 #include <stdio.h>
+#include <sys/types.h>
 
 // An open OutputFile must not be moved in memory, because the list of those with a temporary refers to it.
 typedef struct OutputFile {
@@ -15,6 +16,7 @@ typedef struct OutputFile {
     bool has_folder, is_private, is_finished;
     const char *name;                // of the target in its folder
     char *temporary;                 // the name in the folder until the rename, or NULL
+    pid_t process;                   // that created the temporary, which a forked process keeps at its exit
     struct OutputFile *next_pending; // another file with a temporary
 } OutputFile;
 
