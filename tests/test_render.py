@@ -121,6 +121,18 @@ class Images(TestCase):
         for key in "Software Device Driver Lanes Samples Bounces Region Transfer Kernel".split():
             self.assertTrue(texts[key], key)
 
+    def test_notes_of_options(self):
+        """An option that changes the image is in its notes, and only then."""
+        notes = {"--perturb 3:2": ("Perturb", "3:2"), "--camera other.yaml": ("Camera", "other.yaml"),
+                 "--build-options=-DUNUSED": ("BuildOptions", "-DUNUSED"), "--lenient": ("Lenient", "yes")}
+        write("other.yaml", SPHERE)
+        self.glint(f"render sphere.yaml {SMALL}")
+        usual = png_read("sphere.png")[2]
+        for option, (key, value) in notes.items():
+            self.assertNotIn(key, usual)
+            self.glint(f"render sphere.yaml {SMALL} {option}")
+            self.assertEqual(png_read("sphere.png")[2].get(key), value)
+
     def test_png_of_16_bits(self):
         self.glint(f"render sphere.yaml {SMALL} --bits 16 --transfer none --samples 3 --region 2,1,4,3 -o deep.png")
         head, _, texts, chunks = png_read("deep.png")

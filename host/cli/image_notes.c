@@ -54,6 +54,9 @@ static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
     if (scene->overrides) note_add(notes, "Set", "%s", text_c(&sets));
     text_free(&sets);
     if (scene->animation.has_keys) note_add(notes, "Frame", "%g", scene->animation.frame);
+    const SceneOptions *options = origin->scene_options;
+    if (options->camera) note_add(notes, "Camera", "%s", file_base_name(options->camera));
+    if (options->lenient) note_add(notes, "Lenient", "yes");
 }
 
 typedef enum { NOTE_DEVICE, NOTE_DRIVER, NOTE_LANES, NOTE_KERNEL } DeviceNote;
@@ -96,9 +99,12 @@ static void precision_notes_add(ImageNotes *notes, Precision precision, const Pi
     free(text);
 }
 
-static void settings_notes_add(ImageNotes *notes, const RenderSettings *settings)
+static void settings_notes_add(ImageNotes *notes, const RenderSettings *settings, const char *build_options)
 {
     note_add(notes, "Samples", "%u", settings->sample_count);
+    if (settings->perturb_seed != 0)
+        note_add(notes, "Perturb", "%u:%u", settings->perturb_seed, settings->perturb_scale);
+    if (build_options) note_add(notes, "BuildOptions", "%s", build_options);
     note_add(notes, "Bounces", "%u", settings->bounce_count);
     if (settings->min_contribution > 0)
         note_add(notes, "MinContribution", "%.17g", settings->min_contribution);
@@ -126,7 +132,7 @@ void image_notes_add_all(ImageNotes *notes, const ImageOrigin *origin, const Ima
     device_note_add(notes, NOTE_DRIVER, origin);
     precision_notes_add(notes, origin->settings->precision, options->pilot, counts);
     device_note_add(notes, NOTE_LANES, origin);
-    settings_notes_add(notes, origin->settings);
+    settings_notes_add(notes, origin->settings, renderer_report(origin->renderers[0])->device->build_options);
     format_notes_add(notes, options, format);
     device_note_add(notes, NOTE_KERNEL, origin);
     if (origin->ranks) note_add(notes, "Ranks", "%zu", origin->ranks->remote.count + 1);

@@ -3,6 +3,7 @@
 
 #include "host/cli/image_paths.h"
 #include "host/cli/ranks.h"
+#include "host/import/load.h"
 #include "host/render/renderer.h"
 
 // What an image is rendered from and with, for its notes.
@@ -13,9 +14,10 @@ typedef struct {
     Renderer *const *renderers;
     size_t renderer_count;
     const Ranks *ranks; // render parts of the image; may be NULL
+    const SceneOptions *scene_options;
 } ImageOrigin;
 
-enum { NOTE_COUNT_MAX = 26 };
+enum { NOTE_COUNT_MAX = 30 };
 
 typedef struct {
     ImageNote items[NOTE_COUNT_MAX + 1]; // up to the first without a key

@@ -225,8 +225,9 @@ static int time_render(ImageRender *render)
     if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
-        render->origin = (ImageOrigin){options->scene,      scene, settings, render->open->renderers,
-                                       render->open->count, ranks};
+        render->origin = (ImageOrigin){
+            options->scene,        scene, settings, render->open->renderers, render->open->count, ranks,
+            &options->common.scene};
         const bool can_start = has_started && checkpoint_start(render);
         if (ranks) ranks->start(can_start);
         if (can_start) status = image_render(render);

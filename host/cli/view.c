@@ -60,7 +60,8 @@ static bool image_save(void *context, const char *path, const CompleteImage *ima
     const ViewOptions *view = context;
     const Transfer transfer = image->scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     const ImageOutputOptions options = {.path = path, .transfer = transfer, .bits = 8};
-    const ImageOrigin origin = {view->scene, image->scene, image->settings, &image->renderer, 1, NULL};
+    const ImageOrigin origin = {view->scene, image->scene, image->settings,    &image->renderer,
+                                1,           NULL,         &view->common.scene};
     ImageOutput *output = image_output_open(&options, &origin);
     double seconds;
     if (image_output_write(output, image->film, messages))
