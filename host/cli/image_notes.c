@@ -15,24 +15,25 @@ note_add(ImageNotes *notes, const char *key, const char *format, ...)
     notes->items[notes->count++] = (ImageNote){key, value};
 }
 
+static bool is_of_make(const Rank *rank, const Rank *other)
+{
+    return strcmp(rank->device, other->device) == 0 && strcmp(rank->driver, other->driver) == 0;
+}
+
 // Returns whether the devices may round differently: the precision is not strict and the devices are not all
 // of one make.
 static bool is_mixed(const ImageOrigin *origin)
 {
-    const Device *first = renderer_report(origin->renderers[0])->device;
-    Rank local = {0};
-    rank_set_device(&local, first);
+    Rank first = {0};
+    rank_set_device(&first, renderer_report(origin->renderers[0])->device);
     bool differs = false;
     for (size_t i = 1; i < origin->renderer_count; i++) {
-        const Device *device = renderer_report(origin->renderers[i])->device;
-        differs =
-            differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
+        Rank local = {0};
+        rank_set_device(&local, renderer_report(origin->renderers[i])->device);
+        differs = differs || !is_of_make(&local, &first);
     }
-    for (size_t i = 0; origin->ranks && i < origin->ranks->remote.count; i++) {
-        const Rank *rank = &origin->ranks->items[i];
-        differs =
-            differs || strcmp(rank->device, local.device) != 0 || strcmp(rank->driver, local.driver) != 0;
-    }
+    for (size_t i = 0; origin->ranks && i < origin->ranks->remote.count; i++)
+        differs = differs || !is_of_make(&origin->ranks->items[i], &first);
     return differs && origin->settings->precision != PRECISION_STRICT;
 }
 
@@ -53,10 +54,10 @@ static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
         text_appendf(&sets, "%s%s", set->bytes, set->next ? "\n" : "");
     if (scene->overrides) note_add(notes, "Set", "%s", text_c(&sets));
     text_free(&sets);
-    if (scene->animation.has_keys) note_add(notes, "Frame", "%g", scene->animation.frame);
     const SceneOptions *options = origin->scene_options;
     if (options->camera) note_add(notes, "Camera", "%s", file_base_name(options->camera));
     if (options->lenient) note_add(notes, "Lenient", "yes");
+    if (scene->animation.has_keys) note_add(notes, "Frame", "%g", scene->animation.frame);
 }
 
 typedef enum { NOTE_DEVICE, NOTE_DRIVER, NOTE_LANES, NOTE_KERNEL } DeviceNote;
@@ -101,10 +102,10 @@ static void precision_notes_add(ImageNotes *notes, Precision precision, const Pi
 
 static void settings_notes_add(ImageNotes *notes, const RenderSettings *settings, const char *build_options)
 {
-    note_add(notes, "Samples", "%u", settings->sample_count);
     if (settings->perturb_seed != 0)
         note_add(notes, "Perturb", "%u:%u", settings->perturb_seed, settings->perturb_scale);
     if (build_options) note_add(notes, "BuildOptions", "%s", build_options);
+    note_add(notes, "Samples", "%u", settings->sample_count);
     note_add(notes, "Bounces", "%u", settings->bounce_count);
     if (settings->min_contribution > 0)
         note_add(notes, "MinContribution", "%.17g", settings->min_contribution);
