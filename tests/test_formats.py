@@ -165,10 +165,14 @@ class Formats(TestCase):
         self.glint("verify S1 --precision single --output report.json")
         self.assertEqual(json.loads(read("report.json"))["schema"], 3)
         self.refuses("verify S1 --output report.txt", "the file's ending gives no format")
+        for options in "", "--json", "--format csv":
+            self.refuses(f"verify S1 --output - {options}", "--output takes a file")
+        for path in "text.json", "text.txt":
+            self.refuses(f"verify S1 --format text --output {path}", "--format text cannot be combined with --output")
         self.refuses("verify S1 --format benchmark", "bench and accuracy")
         self.refuses("verify S1 --format jnuit", "--format: .*did you mean junit")
         self.refuses("verify S1 --precision single --output nowhere/report.xml", "nowhere/report.xml")
-        self.assertEqual(list(pathlib.Path().glob("report.txt*")), [])
+        self.assertEqual([*pathlib.Path().glob("report.txt*"), *pathlib.Path().glob("text*")], [])
 
 
 if __name__ == "__main__":

@@ -36,13 +36,15 @@ const Option format_option = {"format",
                               option_choice,
                               offsetof(CommonOptions, report.format),
                               .names = format_names,
-                              .name_count = FORMAT_BENCHMARK};
+                              .name_count = FORMAT_BENCHMARK,
+                              .given = offsetof(CommonOptions, report.has_format)};
 const Option timed_format_option = {"format",
                                     "F",
                                     "text, json, csv, markdown, junit or benchmark" DEFAULT_FORMAT,
                                     option_choice,
                                     offsetof(CommonOptions, report.format),
-                                    NAMES(format_names)};
+                                    NAMES(format_names),
+                                    .given = offsetof(CommonOptions, report.has_format)};
 
 const Option report_options[] = {{"output", "FILE", "write the report to a file and print the text",
                                   option_text, offsetof(CommonOptions, report.output),
@@ -66,8 +68,12 @@ static ReportFormat format_of_ending(const char *path)
 const char *report_options_check(void *common)
 {
     ReportOptions *options = &((CommonOptions *)common)->report;
-    if (options->output && options->format == FORMAT_TEXT)
-        options->format = format_of_ending(options->output);
+    const bool needs_format = options->output && options->format == FORMAT_TEXT;
+    if (options->output && strcmp(options->output, "-") == 0)
+        return "--output takes a file; without it, the report goes to standard output";
+    if (needs_format && options->has_format)
+        return "--format text cannot be combined with --output, since the text is printed in any case";
+    if (needs_format) options->format = format_of_ending(options->output);
     if (options->output && options->format == FORMAT_TEXT)
         return "--output: the file's ending gives no format; use --format";
     return NULL;

@@ -39,6 +39,7 @@ typedef struct {
 typedef struct {
     const ResultTable *table; // describes the command's results
     ReportFormat format;
+    bool has_format; // whether --format was given
     // The file that receives the report while stdout receives the text. NULL prints the report instead of the
     // text.
     const char *output;
@@ -51,8 +52,8 @@ extern const Option format_option, timed_format_option; // the latter of command
 
 enum { REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
 extern const Option report_options[REPORT_OPTION_COUNT];
-// Chooses the format by the file's ending if no other is given. Returns a mistake if the ending names no
-// format.
+// Chooses the format by the file's ending if none is given. Returns a mistake if the file is standard output
+// or would receive text.
 OptionCheck report_options_check;
 // The groups of the options of CommonOptions.report, which must follow those of options that create folders,
 // since the file may be in one.
