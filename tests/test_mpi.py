@@ -153,6 +153,8 @@ class Mpi(TestCase):
         self.assertRegex(self.mpirun(f"-n 2 {RANKS} {RENDER} -o /nowhere/image.png", 1).stderr, "cannot create '/nowhere/image.png'")
         process = self.mpirun_each(f"{RANKS} {RENDER}", f"env OCL_ICD_VENDORS=/none {RANKS} {RENDER}", status=1)
         self.assertRegex(process.stderr, "rank 1 on .*: no OpenCL device")
+        process = self.mpirun(f"-n 2 {RANKS} {RENDER} --precision certified --reference-device none", 1)
+        self.assertRegex(process.stderr, "rank 1 on .*: no suitable reference device")
         process = self.mpirun(f"-n 1 env OCL_ICD_VENDORS=/none {RANKS} {RENDER}", 1)
         self.assertEqual(process.stderr.count("no OpenCL device"), 1, process.stderr)
 

@@ -26,7 +26,7 @@ typedef struct Ranks {
     FilmHeader film;      // describes the image after it is rendered
     // Asks all ranks for their devices. Returns false with a message if a rank has none. All ranks then stop.
     bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
-                  const char *device_selector, MessageList *messages);
+                  const char *device_selector, const char *reference_selector, MessageList *messages);
     // Starts serving the ranks if `can_start` is set, otherwise ends their job.
     void (*start)(bool can_start);
 } Ranks;

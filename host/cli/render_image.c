@@ -222,7 +222,8 @@ static int time_render(ImageRender *render)
     options->output.synchronous = options->timing != TIMING_NONE;
     int status = EXIT_USER;
     const unsigned aovs = shutter_is_last(&render->shutter) ? image_output_aovs(&options->output) : 0;
-    if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
+    if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device,
+                               options->common.reference_device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
         render->origin = (ImageOrigin){

@@ -18,20 +18,27 @@ static void ranks_start(bool can_start)
     broadcast(&order, sizeof order, MPI_COMM_WORLD);
 }
 
+static size_t text_size_of(const char *text)
+{
+    return text ? strlen(text) + 1 : 0;
+}
+
 static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned aovs,
-                        const char *device_selector, MessageList *messages)
+                        const char *device_selector, const char *reference_selector, MessageList *messages)
 {
     Job job = {.type = JOB_IMAGE,
                .settings = *settings,
                .aovs = aovs,
-               .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
+               .device_selector_size = text_size_of(device_selector),
+               .reference_selector_size = text_size_of(reference_selector)};
     // the others show no progress, stop when they receive TAG_END, and neither hash nor keep the scene
     job.settings.stop = NULL;
     job.settings.stop_context = NULL;
     job.settings.stage = NULL;
     job.settings.hashes_scene = job.settings.moves = false;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
-    broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
+    broadcast((void *)(uintptr_t)device_selector, job.device_selector_size, MPI_COMM_WORLD);
+    broadcast((void *)(uintptr_t)reference_selector, job.reference_selector_size, MPI_COMM_WORLD);
     Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);
     MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
     memcpy(ranks->items, all + 1, ranks->remote.count * sizeof *all);

@@ -5,7 +5,8 @@
 // The first rank broadcasts Jobs, the last of which is JOB_END.
 //
 // JOB_IMAGE: all ranks render bands of one image.
-// 1. The first rank broadcasts the device selector. Each other rank opens a device and answers with its Rank.
+// 1. The first rank broadcasts the selectors of the device and of the reference device. Each other rank opens
+// a device and answers with its Rank.
 // 2. The first rank broadcasts Orders: ORDER_SCENE with each variant of the scene that a rank needs, followed
 //    by the compiled scene for the ranks that need it, and then ORDER_START. ORDER_CANCEL ends the job
 //    instead if a rank has no device or the image cannot be rendered.
@@ -47,7 +48,8 @@ typedef struct {
     enum { JOB_END, JOB_FRAMES, JOB_IMAGE } type;
     RenderSettings settings; // of an image, like the members below; all pointers are NULL
     unsigned aovs;
-    size_t selector_size; // of the device selector with its NUL, which follows, or 0 for none
+    // of the selectors with their NULs, which follow, or 0 for none
+    size_t device_selector_size, reference_selector_size;
 } Job;
 
 typedef struct {

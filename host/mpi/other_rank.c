@@ -46,7 +46,8 @@ static void device_close_quietly(RankRenderer *worker)
 }
 
 // Prepares for another image. Reopens a device that failed.
-static void worker_begin(RankRenderer *worker, const Job *job, const char *selector)
+static void worker_begin(RankRenderer *worker, const Job *job, const char *selector,
+                         const char *reference_selector)
 {
     Rank *self = &worker->self;
     *self = (Rank){0};
@@ -63,6 +64,12 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
             return;
         }
         compute_open(compute, device);
+    }
+    if (job->settings.precision == PRECISION_CERTIFIED &&
+        !reference_open(compute, &worker->device.devices, reference_selector)) {
+        snprintf(self->failure, sizeof self->failure, "no suitable reference device");
+        device_close_quietly(worker);
+        return;
     }
     worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
     rank_set_device(self, compute->device);
@@ -106,12 +113,21 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
     end_await(&has_ended);
 }
 
+// Returns the text of this size that the first rank broadcasts, or NULL if the size is 0.
+static char *selector_receive(size_t size)
+{
+    char *selector = size > 0 ? memory_allocate(size, 1) : NULL;
+    broadcast(selector, size, MPI_COMM_WORLD);
+    return selector;
+}
+
 static void job_run(RankRenderer *worker, const Job *job)
 {
     Order order;
-    char *selector = memory_allocate_zeroed(job->selector_size + 1, 1);
-    broadcast(selector, job->selector_size, MPI_COMM_WORLD);
-    worker_begin(worker, job, job->selector_size > 0 ? selector : NULL);
+    char *selector = selector_receive(job->device_selector_size);
+    char *reference_selector = selector_receive(job->reference_selector_size);
+    worker_begin(worker, job, selector, reference_selector);
+    free(reference_selector);
     free(selector);
     MPI_Gather(&worker->self, sizeof worker->self, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
     while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.type == ORDER_SCENE)
