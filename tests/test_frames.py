@@ -121,6 +121,11 @@ class Frames(TestCase):
         # its AOV does not exist
         process = self.glint("render moving.yaml --size 32x18 --skip-existing --aov t")
         self.assertEqual(process.stderr, "glint: wrote moving.png, moving.t.npy\n")
+        # a scene without lights has no file of shadows
+        write("dark.yaml", SPHERE.splitlines()[0])
+        for verb in "wrote", "kept":
+            process = self.glint("render dark.yaml --size 32x18 --skip-existing --aov shadow,t")
+            self.assertRegex(process.stderr, f"glint: {verb} dark.png")
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 
     def test_reports(self):

@@ -36,5 +36,6 @@ char *image_output_aov_path(const ImageOutputOptions *options, const char *name)
 // Returns true with a message if one of the files is a file that the scene was read from.
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path);
-// Returns whether all files of the output exist.
+// Returns whether all files of the output exist, except that of the shadows, which a scene without lights
+// does not have.
 bool image_output_exists(const ImageOutputOptions *options);
