@@ -18,6 +18,8 @@ TEST(texts_are_scrubbed)
         {"/home/bob.smith", "PATH"},
         {"/usr/lib/pocl/libpocl.so.2", "PATH/libpocl.so.2"},
         {"OCL_ICD_VENDORS=/etc/OpenCL/vendors/pocl.icd", "OCL_ICD_VENDORS=PATH/pocl.icd"},
+        {"\"/srv/müller/a.yaml\" /home/annü/x/a.yaml /ärger/ö/a.cl", "\"PATH/a.yaml\" PATH/a.yaml PATH/a.cl"},
+        {"in ‘/srv/x/a.yaml’ as ‘annuser’", "in ‘PATH/a.yaml’ as ‘USER’"},
         {"annuser@box", "USER@box"},
         {"annuser-2 annusers annuser_x annuser", "annuser-2 annusers annuser_x USER"},
         {"a / b, 3/4, and/or, https://glint.example/x, // x",

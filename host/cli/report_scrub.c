@@ -56,6 +56,13 @@ static bool is_of_path(char character)
     return isalnum((unsigned char)character) || strchr("_+-.~@%/", character);
 }
 
+// Returns whether a path that has begun continues with the character. A byte beyond ASCII continues it, but a
+// path may also follow one, which may be part of a quotation mark.
+static bool continues_path(char character)
+{
+    return (unsigned char)character >= 0x80 || is_of_path(character);
+}
+
 // Returns whether a path may begin at a byte. It does after a character that paths lack, after the n of an
 // escaped newline, or after an option's letter, as in -I/usr/include.
 static bool path_may_begin(const Text *text, size_t at)
@@ -71,11 +78,11 @@ static bool path_may_begin(const Text *text, size_t at)
 static size_t path_length(const Text *text, size_t at)
 {
     const char *path = text->items + at;
-    if (path[0] != '/' || path[1] == '\0' || path[1] == '/' || !is_of_path(path[1]) ||
+    if (path[0] != '/' || path[1] == '\0' || path[1] == '/' || !continues_path(path[1]) ||
         !path_may_begin(text, at))
         return 0;
     size_t length = 1;
-    while (path[length] != '\0' && is_of_path(path[length]))
+    while (path[length] != '\0' && continues_path(path[length]))
         length++;
     return length;
 }
@@ -102,6 +109,7 @@ static size_t word_find(const Scrubber *scrubber, const Text *text, size_t at)
         const size_t length = strlen(scrubber->words[i].word);
         if (length > text->count - at || memcmp(here, scrubber->words[i].word, length) != 0) continue;
         if (here[length] != '\0' && is_of_word(here[length])) continue;
+        if (scrubber->words[i].is_path && (unsigned char)here[length] >= 0x80) continue;
         if (scrubber->words[i].is_path || at == 0 || here[-1] == '\0' || !is_of_word(here[-1])) return i;
     }
     return scrubber->count;
