@@ -349,9 +349,10 @@ installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(progra
     $(if $(filter glint-view,$1),$(BUILD)/glint-view.desktop:$(DATADIR)/applications/glint-view.desktop \
         tools/desktop/glint-view.svg:$(DATADIR)/icons/hicolor/scalable/apps/glint-view.svg \
         tools/desktop/glint-view.metainfo.xml:$(DATADIR)/metainfo/alt.glint.glint_view.metainfo.xml)
-programs := glint $(if $(has_window),glint-view) $(if $(wildcard $(BUILD)/glint-mpi),glint-mpi)
+mpi_goal := $(filter mpi,$(MAKECMDGOALS))
+programs := glint $(if $(has_window),glint-view) $(if $(mpi_goal)$(wildcard $(BUILD)/glint-mpi),glint-mpi)
 
-install: all
+install: all $(mpi_goal)
 	sed 's|@DATADIR@|$(DATADIR)|' tools/desktop/glint-view.desktop > $(BUILD)/glint-view.desktop
 	for program in $(programs); do install -D $(BUILD)/$$program $(DESTDIR)$(BINDIR)/$$program || exit; done
 	for pair in $(call installed_files,$(programs)); do \

@@ -57,6 +57,7 @@ check "each of $compiling commands to compile has CPPFLAGS and CFLAGS" test "$co
 check "commands to link have CFLAGS and LDFLAGS" grep -q '^ccc.* -DCOMPILE -DLINK .*-o .*/none/glint$' "$scratch/commands"
 check "warnings fail no build" test "$($make -n BUILD="$scratch/none" WERROR= all | grep -c -e -Werror)" = 0
 check "warnings fail with WERROR=1" test "$($make -n BUILD="$scratch/none" WERROR=1 all | grep -c -e '-Werror .*-c ')" = "$compiling"
+check "make mpi install on a clean tree installs glint-mpi" grep -q ' glint-mpi; do install ' <($make -n BUILD="$scratch/none" mpi install)
 check "PKG_CONFIG finds libraries" grep -q 'Libraries are missing' <($make -n PKG_CONFIG=false all 2>&1)
 
 # Compiles copies of the source in two folders.
