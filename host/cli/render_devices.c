@@ -43,7 +43,7 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
 void render_devices_drop(RenderDevices *open, size_t index)
 {
     char *failure = compute_failure_text(open->items[index].compute);
-    stderr_print("warning: the other devices continue without it: %s", failure);
+    stderr_print("warning: %s; the other devices render its share", failure);
     free(failure);
     open->items[index].is_dropped = true;
 }
@@ -62,7 +62,7 @@ static void unfit_print(MessageList *unfit)
 {
     for (size_t i = 0; i < unfit->count; i++)
         if (unfit->items[i].severity == MESSAGE_ERROR)
-            stderr_print("warning: the other devices continue without it: %s", unfit->items[i].text);
+            stderr_print("warning: %s; the other devices render its share", unfit->items[i].text);
     message_list_free(unfit);
 }
 

@@ -181,9 +181,9 @@ static void message_process(const Ranks *ranks, RankState *state, Scheduler *sch
         return;
     }
     const int rank = status->MPI_SOURCE;
-    fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host,
-            state->failure[0] != '\0' ? state->failure
-                                      : "sent an unexpected message; the other ranks render its rows");
+    stderr_print("warning: rank %d on %s: %s; the other ranks render its rows", rank,
+                 ranks->items[rank - 1].host,
+                 state->failure[0] != '\0' ? state->failure : "sent an unexpected message");
     state->is_dropped = true;
     state->rows = (BandRows){0}; // so that no later band is right
     film_free(&state->band);

@@ -243,7 +243,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     interrupts_hold(); // also while the thread reads a scene
     const bool has_thread = pthread_create(&thread, NULL, own_frames_render, &deal) == 0;
     if (!has_thread) {
-        fprintf(stderr, "glint: warning: cannot start a thread: the other ranks render the frames\n");
+        stderr_print("warning: cannot start a thread; the other ranks render the frames");
         deal.workers--;
     }
     frames_serve(&deal, other_count);
@@ -251,7 +251,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     interrupts_release();
     free(deal.again.items);
     if (deal.workers == 0) {
-        fprintf(stderr, "glint: no rank is left that can render\n");
+        stderr_print("no rank is left that can render");
         render_command_record(command, EXIT_MACHINE);
     } else if (is_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
         render_command_record(command, EXIT_INTERRUPTED);
