@@ -53,7 +53,7 @@ WRONG_COMMAND_LINES = [
     ("notes: a scene's name ends in", "{render|} notes"),
     ('unknown command "folder"', "folder"),
     (r"one scene, but 'b\.yaml' is a second", "trace --rays rays sphere.yaml b.yaml"),
-    (r"writes CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
+    ("the output is CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o {image.jpg|image.PNGX|image.|folder}"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o notes --skip-existing {|--aov t}"),

@@ -156,7 +156,7 @@ class Failures(TestCase):
         write("b.yaml", SPHERE.replace("reflection: 0.1", "image: a.png"))
         os.link("globe.png", "a.png")
         for scenes in "a.yaml b.yaml", "b.yaml a.yaml":
-            self.refuses(f"render {scenes} {SMALL}", "would overwrite 'a.png', which 'b.yaml' is read from")
+            self.refuses(f"render {scenes} {SMALL}", "the output would overwrite 'a.png', from which 'b.yaml' is read")
             self.assertFalse(os.path.exists("b.png"))
         self.assertEqual({name: read(name) for name in files}, files)
         self.glint(f"render globe.yaml {SMALL} -o globe/other.png")

@@ -96,8 +96,8 @@ static void text_print(const Certification *certification)
     printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
            sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
            certification->reference_seconds);
-    if (uncertain > 0) printf("; %zu uncertain in it are not counted as right or wrong", uncertain);
-    if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
+    if (uncertain > 0) printf("; %zu that it leaves uncertain are not counted", uncertain);
+    if (textured > 0) printf("; the colors of %zu with a texture are not compared", textured);
     puts("\n                         wrong                 largest error of color        largest margin\n"
          "  precision   object  shadow    path   color   right     wrong     at         of a wrong pixel");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {

@@ -42,7 +42,7 @@ static const Option command_options[] = {
      option_number, offsetof(DiffOptions, limits[LIMIT_ULP]), NUMBERS(0, INFINITY)},
     {"heatmap", "FILE", "write an image of the differences: .png, .ppm, .exr or .npy", option_text,
      offsetof(DiffOptions, heatmap_path)},
-    {"layer", "NAME", "compare this layer of EXR files, not the default or only one", option_text,
+    {"layer", "NAME", "compare this layer of EXR files instead of the default", option_text,
      offsetof(DiffOptions, layer)}};
 
 static const ResultTable diff_table = {

@@ -134,7 +134,8 @@ bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path)
 {
     if (!scene_was_read_from(scene, scene_path, path)) return false;
-    stderr_print("would overwrite '%s', which '%s' is read from; choose another with -o", path, scene_path);
+    stderr_print("the output would overwrite '%s', from which '%s' is read; name another file with -o", path,
+                 scene_path);
     return true;
 }
 

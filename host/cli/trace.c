@@ -33,7 +33,7 @@ static const char *options_check(void *trace_options)
     const TraceOptions *options = trace_options;
     if (!options->rays) return "no rays given; use --rays FILE";
     if (image_format_of(options->output) != IMAGE_UNKNOWN)
-        return "writes CSV: the output's name must not be an image's or array's";
+        return "the output is CSV; its name must not end in that of an image or array, such as .png or .npy";
     return NULL;
 }
 
