@@ -349,7 +349,7 @@ class View(TestCase):
 
     def shows_frame(self, window, text, frame):
         """Checks that the display, except for the time line's mark, and the saved image are what glint render makes of the frame."""
-        window.title_at_last(f", frame {frame} of {FRAMES}, {SAMPLES} samples")
+        window.title_at_last(f", frame {frame} of 0-{FRAMES - 1}, {SAMPLES} samples")
         rows = self.image_of(text, f"--frames {frame}")
         window.shows_at_last(rows[: HEIGHT * 2 // 3])
         mark = int((frame + 0.5) / FRAMES * WIDTH), HEIGHT - 1
@@ -422,7 +422,7 @@ class View(TestCase):
         window.close()
         window = Window(self, options="--write-camera")
         window.key("period", "period")
-        window.title_at_last(f", frame 2 of {FRAMES}, {SAMPLES} samples")
+        window.title_at_last(f", frame 2 of 0-{FRAMES - 1}, {SAMPLES} samples")
         window.key("Left")
         camera = window.camera()
         window.line("^scene.yaml:2:20: error: the camera cannot be written: it is animated; K records a key")

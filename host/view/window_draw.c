@@ -16,7 +16,7 @@ static void title_set(const Window *window)
                  precision_names[window->wanted.precision], window->wanted.size.width,
                  window->wanted.size.height);
     if (has_time_line(window))
-        text_appendf(&title, ", frame %u of %u", window->wanted.scene_frame, window->scene.frame_count);
+        text_appendf(&title, ", frame %u of 0-%u", window->wanted.scene_frame, window->scene.frame_count - 1);
     if (!window->frame.pixels || window->frame.number < window->image_request)
         text_appendf(&title, ", preparing");
     else if (window->frame.samples < count)

@@ -71,6 +71,7 @@ void time_line_draw(const Window *window)
     area_fill(target, (SDL_Rect){at - MARK_WIDTH / 2, top, MARK_WIDTH, height},
               (SDL_Color){96, 160, 255, 255});
     char text[64];
-    snprintf(text, sizeof text, "frame %u of %u", window->wanted.scene_frame, window->scene.frame_count);
+    snprintf(text, sizeof text, "frame %u of 0-%u", window->wanted.scene_frame,
+             window->scene.frame_count - 1);
     caption_draw_line(window->screen.caption, INDENT, top + MARGIN, text);
 }
