@@ -64,8 +64,8 @@ function drawFacts({ size: [width, height], pixels, lights, bounces, reference, 
                  `${plural(samples, "sample")} per pixel, kernel `, html("span", { class: "hash" }, hash), ").");
   }
   if (reference.nonfinite + reference.negative) {
-    facts.append(" ", html("strong", {}, `The reference itself has ${plural(reference.nonfinite, "pixel")} that are not ` +
-                                         `finite and ${formatCount(reference.negative)} that are negative.`));
+    facts.append(" ", html("strong", {}, `Pixels of the reference: ${formatCount(reference.nonfinite)} not finite, ` +
+                                         `${formatCount(reference.negative)} negative.`));
   }
   if (edges.status !== "unavailable") {
     facts.append(` Of its ${formatCount(pixels)} pixels ${formatCount(edges.silhouette)} lie at silhouettes, ` +
