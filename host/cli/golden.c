@@ -297,7 +297,7 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         stderr_print("'%s' has no lines", options->file);
         return EXIT_USER;
     }
-    GoldenCheck *checks = memory_allocate_zeroed(checked + 1, sizeof *checks);
+    GoldenCheck *checks = memory_allocate_zeroed(checked, sizeof *checks);
     int status = EXIT_DONE, differing = 0;
     for (size_t i = 0; i < checked && status == EXIT_DONE; i++) {
         checks[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : file->items[i].scene;

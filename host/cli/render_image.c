@@ -45,22 +45,22 @@ static bool band_receive(void *context, const Film *band)
 {
     ImageRender *render = context;
     Shutter *shutter = &render->shutter;
-    bool is_taken = true;
+    bool is_written = true;
     if (is_interrupted()) return false;
     if (shutter->time_count == 1) {
-        is_taken = image_output_write(render->output, band, &render->messages);
+        is_written = image_output_write(render->output, band, &render->messages);
     } else if (render->output) {
         Film mean = shutter_mean(shutter, band);
-        is_taken = image_output_write(render->output, &mean, &render->messages);
+        is_written = image_output_write(render->output, &mean, &render->messages);
         free(mean.layers[LAYER_COLOR]);
     } else {
         shutter_add(shutter, band);
     }
     const double fraction_done =
         shutter_fraction(shutter, (double)(band->first_row + band->height) / render->settings.region_height);
-    if (is_taken) estimate_print(render, fraction_done);
+    if (is_written) estimate_print(render, fraction_done);
     progress_show(&shutter->progress, fraction_done);
-    return is_taken;
+    return is_written;
 }
 
 static void device_drop(void *context, size_t index)

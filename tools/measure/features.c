@@ -22,7 +22,7 @@ typedef struct {
     FeatureSet extra;
     Renderer *renderer;
     double first_seconds, frame_seconds; // the first includes the build
-} Variant;
+} FeatureVariant;
 
 // Returns the processor time of all threads, and of the linkers that a driver started.
 static double processor_seconds(void)
@@ -46,7 +46,7 @@ static double frame_seconds(Renderer *renderer)
     return processor_seconds() - start;
 }
 
-static void variant_build(Variant *variant, Compute *compute, const Scene *scene)
+static void variant_build(FeatureVariant *variant, Compute *compute, const Scene *scene)
 {
     RenderSettings settings = settings_of_image(1920, 1080, PRECISION_SINGLE);
     settings.bounce_count = 5;
@@ -60,24 +60,24 @@ static void variant_build(Variant *variant, Compute *compute, const Scene *scene
     variant->first_seconds = fmin(variant->first_seconds, frame_seconds(variant->renderer));
 }
 
-static size_t variants_list(Variant *variants, FeatureSet own)
+static size_t variants_list(FeatureVariant *variants, FeatureSet own)
 {
     size_t count = 0;
-    variants[count++] = (Variant){.name = "the scene's own"};
+    variants[count++] = (FeatureVariant){.name = "the scene's own"};
     for (size_t i = 0; i < FEATURE_COUNT; i++) {
         if (own >> i & 1) continue;
         variants[count].extra = 1u << i;
         snprintf(variants[count++].name, sizeof variants->name, "and %s", feature_names[i]);
     }
-    variants[count++] = (Variant){.name = "all", .extra = FEATURE_ALL};
+    variants[count++] = (FeatureVariant){.name = "all", .extra = FEATURE_ALL};
     for (size_t i = 0; i < count; i++)
         variants[i].first_seconds = variants[i].frame_seconds = INFINITY;
     return count;
 }
 
-static void table_print(const Variant *variants, size_t count, double opening)
+static void table_print(const FeatureVariant *variants, size_t count, double opening)
 {
-    const Variant *own = variants;
+    const FeatureVariant *own = variants;
     printf("| kernel | frame ms | ratio | build ms |\n|---|---|---|---|\n");
     for (size_t i = 0; i < count; i++)
         printf("| %s | %.1f | %.2f | %.0f |\n", variants[i].name, 1e3 * variants[i].frame_seconds,
@@ -96,7 +96,7 @@ int main(int argument_count, char **arguments)
     OpenDevice open;
     if (!scene_open(&scene, arguments[1], &(CommonOptions){0}) || !device_open(&open, &(CommonOptions){0}))
         return EXIT_FAILURE;
-    Variant variants[VARIANT_COUNT] = {0};
+    FeatureVariant variants[VARIANT_COUNT] = {0};
     size_t count = variants_list(variants, features_of(&scene));
     variant_build(&variants[0], &open.compute, &scene);
     double first = variants[0].first_seconds;
