@@ -131,7 +131,7 @@ static bool worker_greets(MeasuredProgram *worker, size_t row_count)
     snprintf(expected, sizeof expected, greeting, row_count);
     if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
     if (!worker_is_interrupted(worker))
-        stderr_print("'%s' does not answer as a glint with bench --against does", worker->name);
+        stderr_print("'%s' is not a glint that supports bench --against", worker->name);
     return false;
 }
 
