@@ -181,7 +181,7 @@ for line in worker.stdout:
         process = self.glint(f"{command} {PROGRAM} --seconds 0.01", status=4)
         self.assertRegex(process.stdout, "2 samples, 5 bounces: 1 pair\n.*: too noisy to decide")
         self.refuses(f"{command} ./none", "cannot run './none'")
-        self.refuses(f"{command} /bin/true", "does not answer")
+        self.refuses(f"{command} /bin/true", "is not a glint that supports")
         self.refuses("bench - --against ./other", "it cannot be '-'")
         self.refuses(f"{command} ./other --compare report", "cannot be combined")
         self.refuses(f"{command} ./other --device none-such", "none-such")

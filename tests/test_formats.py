@@ -169,7 +169,7 @@ class Formats(TestCase):
             self.refuses(f"verify S1 --output - {options}", "--output takes a file")
         for path in "text.json", "text.txt":
             self.refuses(f"verify S1 --format text --output {path}", "--format text cannot be combined with --output")
-        self.refuses("verify S1 --format benchmark", "bench and accuracy")
+        self.refuses("verify S1 --format benchmark", "--format: expected text, json, csv, markdown or junit")
         self.refuses("verify S1 --format jnuit", "--format: .*did you mean junit")
         self.refuses("verify S1 --precision single --output nowhere/report.xml", "nowhere/report.xml")
         self.assertEqual([*pathlib.Path().glob("report.txt*"), *pathlib.Path().glob("text*")], [])
