@@ -24,23 +24,12 @@ typedef struct {
     atomic_bool exceeds;
 } RangeTest;
 
-// Returns whether an oval is in range in the unit shape's space, where distances are up to twice the
-// inverse's norm times as large, and not smaller.
-static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)
+// Returns whether a torus in an oval's unit space is in range.
+static bool unit_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)
 {
     const double unit = oval->sizes.x;
-    if (!(2 * oval->inverses[0].w * reach <= range->reach_max)) return false;
     return oval->id.z != TYPE_TORI ||
            (unit <= range->torus_max && (unit >= range->torus_min || unit <= range->roundoff * reach));
-}
-
-// Returns whether coordinates in which the shape is of size 1 are in range. Their powers may be infinite,
-// which is above 1 like the coordinate, or 0.
-static bool superellipsoid_is_in_range(const CertifiedRange *range, const Superellipsoid *shape, double reach)
-{
-    for (int i = 0; i < 3; i++)
-        if (!(shape->rows[i].w * reach <= range->reach_max)) return false;
-    return true;
 }
 
 static bool is_in_range(const CertifiedRange *range, size_t type, const void *primitive)
@@ -49,8 +38,9 @@ static bool is_in_range(const CertifiedRange *range, size_t type, const void *pr
     // a plane's distance is not squared
     if (type == TYPE_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
-    if (type == TYPE_SUPERELLIPSOIDS) return superellipsoid_is_in_range(range, primitive, reach);
-    if (type == TYPE_OVALS) return oval_is_in_range(range, primitive, reach);
+    if (shape_ops[type]->stretch && !(shape_ops[type]->stretch(primitive) * reach <= range->reach_max))
+        return false;
+    if (type == TYPE_OVALS) return unit_is_in_range(range, primitive, reach);
     if (type != TYPE_TORI) return true;
     const Torus *torus = primitive;
     const double size = torus->center_major.w + torus->axis_minor.w;

@@ -29,6 +29,9 @@ typedef struct {
     // Returns the condition of a primitive, by which the kernel's rounding_scale grows beyond the sum of
     // seven of its coordinates (host/compile/contact.c). NULL means not beyond.
     double (*condition)(const void *primitive);
+    // Returns the largest factor by which a map of the kernel stretches lengths, to coordinates in which the
+    // shape has a size near 1 (host/compile/certified_range.c). NULL means that it maps nothing.
+    double (*stretch)(const void *primitive);
 } ShapeOps;
 
 // Indexed by ShapeType, whose values except SHAPE_MESH are those of TYPE_….

@@ -88,10 +88,18 @@ static double oval_condition(const void *primitive)
     return oval->extent.w;
 }
 
+// In the unit shape's space distances are up to twice the inverse's norm times as large, and not smaller.
+static double oval_stretch(const void *primitive)
+{
+    const Oval *oval = primitive;
+    return 2 * oval->inverses[0].w;
+}
+
 const ShapeOps oval_ops = {
     .bounds = oval_bounds,
     .flatten = oval_flatten,
     .primitive_bounds = oval_primitive_bounds,
     .largest_coordinate = oval_largest_coordinate,
     .condition = oval_condition,
+    .stretch = oval_stretch,
 };

@@ -61,9 +61,17 @@ static double superellipsoid_condition(const void *primitive)
     return 2 * shape->extent.w / shape->center.w;
 }
 
+// The powers of coordinates in range may be infinite, which is above 1 like the coordinate, or 0.
+static double superellipsoid_stretch(const void *primitive)
+{
+    const Superellipsoid *shape = primitive;
+    return fmax(shape->rows[0].w, fmax(shape->rows[1].w, shape->rows[2].w));
+}
+
 const ShapeOps superellipsoid_ops = {
     .bounds = superellipsoid_bounds,
     .flatten = superellipsoid_flatten,
     .primitive_bounds = superellipsoid_primitive_bounds,
     .condition = superellipsoid_condition,
+    .stretch = superellipsoid_stretch,
 };
