@@ -57,7 +57,7 @@ static bool path_has(const char *name)
 }
 
 // Starts glint-NAME if there is such a program on the PATH, as git does: the Python package has glint-locate.
-// Returns whether there is one, or what it belongs to is known, with a message.
+// Returns whether it printed why that failed. It prints nothing if the command is unknown.
 static bool program_start(const char *name, char **arguments)
 {
     if (strchr(name, '/')) return false;

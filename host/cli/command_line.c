@@ -33,7 +33,7 @@ int command_finish(int status)
     if (status == EXIT_INTERRUPTED) interrupt_report("");
     // a truncated report must not exit with success
     if (fflush(stdout) != 0 || ferror(stdout)) {
-        stderr_print("cannot write the standard output: %s", strerror(errno));
+        stderr_print("cannot write to standard output: %s", strerror(errno));
         return EXIT_MACHINE;
     }
     fault_output_is_complete(status);

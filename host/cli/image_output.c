@@ -287,7 +287,7 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
             image_writer_abandon(writers[i]);
     }
     if (whole && image_output_is_stdout(output->options->path) && fflush(stdout) != 0) {
-        whole = message_error(messages, "cannot write the standard output: %s", strerror(errno));
+        whole = message_error(messages, "cannot write to standard output: %s", strerror(errno));
         clearerr(stdout);
     }
     *seconds = output->seconds + (clock_seconds() - start);

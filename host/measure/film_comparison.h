@@ -52,11 +52,11 @@ typedef struct {
     bool away;  // for counted types, whether the place is away from the reference's edges
     uint32_t x, y;
     uint32_t light; // for shadows, the first light that is wrong there
-    // For shading and image, the error of a channel; for t, relative; for normals, in radians; for counted
-    // types, the error of the color.
+    // The error of a channel for shading and image, a relative one for t, radians for normals, and the error
+    // of the color for counted types.
     double error;
-    // For objects, ids; for shadows, bits; for paths, signatures; for t, distances; for shading and image,
-    // the values of that channel. Unset for normals.
+    // The ids of objects, the bits of shadows, the signatures of paths, the distances for t, and the values
+    // of that channel for shading and image. Unset for normals.
     double reference, variant;
     double reference_color[3], variant_color[3];
 } AccuracyWorst;

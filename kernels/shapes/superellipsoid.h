@@ -2,9 +2,9 @@
 // Applications 1(1), 1981) under a linear map, the points x, seen from the center, with f = 0 for
 //     f = sum |q|^n - 1,   q = A x,   n even.
 //
-// Along a line f is convex, so that it has at most two zeros, and Newton's method from outside approaches the
-// nearer one. But for roundings of f, at which it ends, it does not pass it. It starts where the line enters
-// the box |q| <= 1. There f is at most 2, so that few steps suffice unless the ray grazes.
+// Along a line f is convex, so it has at most two zeros. Newton's method from outside approaches the nearer
+// one and does not pass it, except by roundings of f, at which it ends. It starts where the line enters the
+// box |q| <= 1. There f is at most 2, so few steps suffice unless the ray grazes.
 #ifndef SUPERELLIPSOID_H
 #define SUPERELLIPSOID_H
 
@@ -205,6 +205,8 @@ typedef struct {
 // sum or of a product, 3 u, and of the sum of the three terms of a slope.
 #define SUPERELLIPSOID_ROUNDING ((real)(64 * UNIT_ROUNDOFF))
 
+// Returns a lower bound of a term of the slope, over the exponent. The term is negative unless |q| certainly
+// grows. `low` bounds |q| from below, and the odd powers are those of its bounds.
 static inline real superellipsoid_least_term(real q, real towards, real moved, real low, real low_odd,
                                              real high_odd)
 {
