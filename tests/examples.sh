@@ -15,7 +15,7 @@ example() {
 # Makes numbers, hashes, devices and columns alike.
 shape() {
     sed -E 's/\(kernel [0-9a-f]+\)/(kernel H)/; s/\b[0-9a-f]{16}\b/H/g; s/[-+]?[0-9.]+(e[-+]?[0-9]+)?|inf/N/g; s/ on .* \(/ on D (/; s/ +/ /g; s/ $//' |
-        grep -v -e 'Portable Computing Language' -e '^ for an error of' -e 'fastest rows' -e 'crossed out' | sort -u
+        grep -v -e 'Portable Computing Language' -e '^ for an error of' -e 'fastest rows' -e ' crossed out:' | sort -u
 }
 exact() {
     check "$1: $2" test -n "$(example "$1" "$2")"

@@ -255,8 +255,8 @@ class Accuracy(TestCase):
 
     def test_table(self):
         table = self.glint(f"accuracy {self.spheres} {SMALL} --precision double").stdout
-        self.assertRegex(table, "double .* the reference")
-        self.assertRegex(table, "(?m)^    for an error of at most 1e-06: double, .* ms, the reference itself; no other is within it$")
+        self.assertRegex(table, r"(?m)^frame ms\n +[0-9.e-]+\n    the reference\nreference: double, .* at silhouettes$")
+        self.assertRegex(table, "(?m)^  for an error of at most 1e-06: double, .* ms, the reference itself; no other is within it$")
 
     def test_ties(self):
         """Each pick lists the other rows within its budget. A sentence states that two runs are too few to compare times."""

@@ -102,7 +102,7 @@ class Bench(TestCase):
         untimed = {"status": "unavailable", "reason": "builds were not timed"}
         (row,) = json.loads(read("report.json"))["runs"]
         self.assertEqual((row["build_ms"], row["traverses_bvh"]), ({"cold": untimed, "cached": untimed}, True))
-        self.assertEqual(process.stdout.count("builds were not timed"), 1)
+        self.assertNotIn("build", process.stdout)
 
     def test_report_in_new_folder(self):
         """The folder of kernels exists before the report in it is opened. A wrong command line creates neither."""
@@ -179,7 +179,7 @@ for line in worker.stdout:
             self.assertGreaterEqual(len(run["frame_samples_ms"]), 50)
             self.assertEqual(len(run["frame_samples_ms"]), len(run["against_frame_samples_ms"]))
         process = self.glint(f"{command} {PROGRAM} --seconds 0.01", status=4)
-        self.assertRegex(process.stdout, "2 samples, 5 bounces: 1 pair\n.*: too noisy to decide")
+        self.assertRegex(process.stdout, "(?m)^ +2 .*\n    1 pair\n.*: too noisy to decide")
         self.refuses(f"{command} ./none", "cannot run './none'")
         self.refuses(f"{command} /bin/true", "is not a glint that supports")
         self.refuses("bench - --against ./other", "it cannot be '-'")
@@ -227,8 +227,8 @@ for line in worker.stdout:
             times, first = run["frame_samples_ms"], runs[0]["frame_samples_ms"]
             ratios = [mine / other for mine, other in zip(times, first)]
             self.assertTrue(min(ratios) <= run["to_first"]["ratio"] <= max(ratios), run["to_first"])
-        self.assertRegex(out, r"(?m)^    \(no options\)$")
-        self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first variant's frame time$")
+        self.assertRegex(out, r'(?m)^ +1 +5  ""  ')
+        self.assertRegex(out, r"(?m)^ +1 +5  --work-group 4x2 .*  [0-9.]+( \([0-9.]+ to [0-9.]+\))?$")
         self.assertEqual(re.findall(r"(?m)^ +rays: ([0-9]+) camera", out), ["768", "768", "1536"], "where they differ")
         command = f"bench sphere.yaml {TINY} --lanes 1 --seconds 0.1 --variant '' --variant '--bounces 0'"
         names = {entry["name"] for entry in self.json(f"{command} --format benchmark")["benchmarks"]}
@@ -267,10 +267,10 @@ for line in worker.stdout:
         self.assertEqual((runs[1]["lanes"], runs[1]["status"], runs[1]["reason"]), (16, "unavailable", reason))
         self.assertEqual(runs[2]["lanes"], lanes)
         self.assertEqual(runs[2]["to_first"], {"status": "unavailable", "reason": "the first variant's row is not available"})
-        self.assertIn(f"not available: {reason}\n", out)
-        self.assertIn("--lanes 16 --samples 2: not compared, because the first variant's row is not available\n", out)
+        self.assertIn(f"  unavailable: {reason}\n", out)
+        self.assertIn("    not compared, because the first variant's row is not available\n", out)
         process = self.glint(f"{command} --against {PROGRAM}", 4)
-        self.assertRegex(process.stdout, f", 16 lanes, .*: 0 pairs\n    {reason}\n")
+        self.assertRegex(process.stdout, f"(?m)^ +16  unavailable: {reason}\n")
 
     def test_passports_of_variants(self):
         """Rows with work-groups have the device's passports, and those with build options have separate ones."""

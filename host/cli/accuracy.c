@@ -305,9 +305,7 @@ static int accuracy_run(Accuracy *accuracy)
     if (status != EXIT_DONE) return status;
     const AccuracyReport *report = &accuracy->report;
     const ReportOptions *options = &accuracy->options.variants.common.report;
-    if (report_has_text(options)) accuracy_print_text(report, stdout);
-    if (report_has_document(options) && !report_write(accuracy_json(report), options)) return EXIT_USER;
-    if (!page_commit(accuracy)) return EXIT_USER;
+    if (!accuracy_print(report, options) || !page_commit(accuracy)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     stderr_print("no variant could be rendered");
     return EXIT_USER;

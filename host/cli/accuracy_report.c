@@ -2,7 +2,6 @@
 
 #include "host/base/array.h"
 #include "host/cli/passport_report.h"
-#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
@@ -107,114 +106,65 @@ Text accuracy_pick_sentence(const AccuracyScene *scene, size_t pick)
     return text;
 }
 
-static const char table_head[] =
-    "                              frame   wrong object   wrong shadow     wrong path          shading"
-    "             t     normal    image   8-bit values         FLIP\n"
-    "  precision lanes bvh  samp.     ms   edge    away   edge    away   edge    away     RMSE      max"
-    "   99.9% ulp   99.9%       dB  off 1   more     mean    max\n";
-
-static void count_print(EdgeCount count, FILE *stream)
-{
-    fprintf(stream, " %6zu %7zu", count.edge, count.away);
-}
-
-static void errors_print(const AccuracyErrors *errors, FILE *stream)
-{
-    if (errors->why_colors_only) {
-        fprintf(stream, " %6s %7s %6s %7s %6s %7s  %7s  %7s  %10s %8s", "-", "-", "-", "-", "-", "-", "-",
-                "-", "-", "-");
-    } else {
-        count_print(errors->object, stream);
-        count_print(errors->shadow, stream);
-        count_print(errors->path, stream);
-        fprintf(stream, "  %7.1e  %7.1e  %10.3g %8.1e", errors->shading.rmse, errors->shading.largest,
-                errors->t_ulps.percentile_999, errors->normal.percentile_999);
-    }
-    fprintf(stream, " %8.1f %6zu %6zu  %7.1e %6.3f\n", errors->image.psnr, errors->display.off_by_1,
-            errors->display.off_by_more, errors->display.flip_mean, errors->display.flip_max);
-}
-
-static void crossed_print(const AccuracyVariant *variant, FILE *stream)
-{
-    if (variant->disqualified == 0) return;
-    fputs("            crossed out:", stream);
-    const char *words;
-    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
-        fprintf(stream, "%s %s", i > 0 ? "," : "", words);
-    if (variant->disqualified & (DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE))
-        fprintf(stream, " (%zu not finite, %zu negative)", variant->errors.nonfinite,
-                variant->errors.negative);
-    fputc('\n', stream);
-}
-
-static void variant_print(const AccuracyVariant *variant, FILE *stream)
-{
-    const BenchKey *key = &variant->row->key;
-    fprintf(stream, "%c %-9s %5u %-4s %5u", variant->disqualified ? 'x' : ' ', key->precision, key->lanes,
-            key->bvh, variant->samples);
-    if (variant->status == ACCURACY_UNAVAILABLE) {
-        fprintf(stream, "  unavailable: %s\n", variant->row->failure);
-        return;
-    }
-    fprintf(stream, " %6.4g", accuracy_frame_ms(variant));
-    if (variant->status == ACCURACY_REFERENCE)
-        fputs("  the reference\n", stream);
-    else
-        errors_print(&variant->errors, stream);
-    crossed_print(variant, stream);
-}
-
-static void reference_print(const AccuracyScene *scene, FILE *stream)
+static void reference_append(Text *notes, const AccuracyScene *scene)
 {
     if (scene->reference.file)
-        fprintf(stream, "  reference: %s, colors only", scene->reference.file);
+        text_appendf(notes, "reference: %s, colors only", scene->reference.file);
     else
-        fprintf(stream, "  reference: %s, %u lane%s, %u sample%s; %zu pixel%s at silhouettes",
-                scene->reference.precision, scene->reference.lanes, text_plural(scene->reference.lanes),
-                scene->reference.samples, text_plural(scene->reference.samples),
-                scene->edges.silhouette_pixels, text_plural(scene->edges.silhouette_pixels));
-    if (scene->reference.device) fprintf(stream, "; on %s", scene->reference.device);
+        text_appendf(notes, "reference: %s, %u lane%s, %u sample%s; %zu pixel%s at silhouettes",
+                     scene->reference.precision, scene->reference.lanes, text_plural(scene->reference.lanes),
+                     scene->reference.samples, text_plural(scene->reference.samples),
+                     scene->edges.silhouette_pixels, text_plural(scene->edges.silhouette_pixels));
+    if (scene->reference.device) text_appendf(notes, "; on %s", scene->reference.device);
     if (scene->reference.nonfinite + scene->reference.negative > 0)
-        fprintf(stream, "; %zu of its pixels are not finite, %zu negative", scene->reference.nonfinite,
-                scene->reference.negative);
-    fputc('\n', stream);
+        text_appendf(notes, "; %zu of its pixels are not finite, %zu negative", scene->reference.nonfinite,
+                     scene->reference.negative);
+    text_appendf(notes, "\n");
 }
 
-static void kernels_print(const AccuracyScene *scene, FILE *stream)
+static void crossed_append(Text *notes, const AccuracyVariant *variant)
 {
-    fputs("  kernels:", stream);
-    for (size_t i = 0, printed = 0; i < scene->variant_count; i++) {
-        const AccuracyVariant *variant = &scene->variants[i];
-        if (variant->status == ACCURACY_UNAVAILABLE) continue;
-        Text name = {0};
-        accuracy_variant_name(&name, scene, variant);
-        fprintf(stream, "%s %s %016" PRIx64, printed++ > 0 ? "," : "", text_c(&name),
-                variant->row->kernel_hash);
-        text_free(&name);
-    }
-    fputc('\n', stream);
+    if (variant->disqualified == 0) return;
+    text_appendf(notes, "    crossed out:");
+    const char *words;
+    for (size_t i = 0; (words = accuracy_crossed_words(variant, i)); i++)
+        text_appendf(notes, "%s %s", i > 0 ? "," : "", words);
+    if (variant->disqualified & (DISQUALIFIED_NONFINITE | DISQUALIFIED_NEGATIVE))
+        text_appendf(notes, " (%zu not finite, %zu negative)", variant->errors.nonfinite,
+                     variant->errors.negative);
+    text_appendf(notes, "\n");
 }
 
-void accuracy_print_text(const AccuracyReport *report, FILE *stream)
+// Appends a scene's reference and recommendations.
+static void scene_append(Text *notes, const AccuracyScene *scene)
 {
-    device_heading_print(report->device, stream);
-    if (report->perturb_seed > 0)
-        fprintf(stream, "every variant with injected rounding errors: --perturb %u:%u\n",
-                report->perturb_seed, report->perturb_scale);
-    for (size_t i = 0; i < report->scene_count; i++) {
-        const AccuracyScene *scene = &report->scenes[i];
-        fprintf(stream, "\n%s, %ux%u\n", scene->path, scene->width, scene->height);
-        reference_print(scene, stream);
-        fputs(table_head, stream);
-        for (size_t k = 0; k < scene->variant_count; k++)
-            variant_print(&scene->variants[k], stream);
-        kernels_print(scene, stream);
-        fprintf(stream, "  fastest rows, with intervals of %g%% confidence for all together:\n",
-                100 * comparison_confidence);
-        for (size_t k = 0; k < scene->recommendation_count; k++) {
-            Text sentence = accuracy_pick_sentence(scene, k);
-            fprintf(stream, "    %s\n", text_c(&sentence));
-            text_free(&sentence);
-        }
+    reference_append(notes, scene);
+    text_appendf(notes, "fastest rows, with intervals of %g%% confidence for all together:\n",
+                 100 * comparison_confidence);
+    for (size_t i = 0; i < scene->recommendation_count; i++) {
+        Text sentence = accuracy_pick_sentence(scene, i);
+        text_appendf(notes, "  %s\n", text_c(&sentence));
+        text_free(&sentence);
     }
+}
+
+static void accuracy_notes(const void *context, size_t row, Text *notes)
+{
+    const AccuracyScene *scene = ((const AccuracyReport *)context)->scenes;
+    for (; row >= scene->variant_count; scene++)
+        row -= scene->variant_count;
+    if (scene->variants[row].status == ACCURACY_REFERENCE) text_appendf(notes, "    the reference\n");
+    crossed_append(notes, &scene->variants[row]);
+    if (row + 1 == scene->variant_count) scene_append(notes, scene);
+}
+
+bool accuracy_print(const AccuracyReport *report, const ReportOptions *options)
+{
+    if (report_has_text(options)) {
+        device_heading_print(report->device, stdout);
+        if (report->perturb_seed > 0)
+            printf("every variant with injected rounding errors: --perturb %u:%u\n", report->perturb_seed,
+                   report->perturb_scale);
+    }
+    return report_output(accuracy_json(report), options, accuracy_notes, report);
 }

@@ -14,7 +14,9 @@ typedef struct {
     const char *folder; // the folder of the saved arrays, or NULL
 } AccuracyReport;
 
-void accuracy_print_text(const AccuracyReport *report, FILE *stream);
+// Prints and writes the report as the options ask. Returns false with a message if the file cannot be
+// written.
+bool accuracy_print(const AccuracyReport *report, const ReportOptions *options);
 // Describes the members of accuracy_json.
 extern const ResultTable accuracy_table;
 // Returns the report as docs/glint-json.5 describes it. The caller prints it.

@@ -203,7 +203,7 @@ static void baseline_warn(const Baseline *baseline, const Device *device)
         stderr_print("the baseline was measured on another host, \"%s\"", baseline->host);
 }
 
-static int bench_print(const Bench *bench, const Baseline *baseline)
+static int bench_report(const Bench *bench, const Baseline *baseline)
 {
     const BenchOptions *options = &bench->options;
     const VariantSet *set = &bench->set;
@@ -216,9 +216,7 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         .comparisons = comparisons,
     };
     const ReportOptions *format = &options->variants.common.report;
-    if (report_has_text(format)) bench_print_text(&report, stdout);
-    int status = EXIT_DONE;
-    if (report_has_document(format) && !report_write(bench_json(&report), format)) status = EXIT_USER;
+    int status = bench_print(&report, format) ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         stderr_print("no row could be measured");
         status = EXIT_USER;
@@ -239,7 +237,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     progress_open(&progress, !report_has_text(&bench->options.variants.common.report));
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
-    return whole ? bench_print(bench, baseline) : EXIT_INTERRUPTED;
+    return whole ? bench_report(bench, baseline) : EXIT_INTERRUPTED;
 }
 
 static int against_run(Bench *bench, int argument_count, char **arguments)

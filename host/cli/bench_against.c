@@ -280,8 +280,10 @@ static Json *against_json(const Against *against, const Device *device)
     for (size_t i = 0; i < against->set->count; i++) {
         json_begin_object(json, NULL);
         key_json(json, &against->set->rows[i].key);
-        comparison_json(json, &against->comparisons[i]);
-        if (!against->comparisons[i].why_not) {
+        if (against->comparisons[i].why_not) {
+            unavailable_json(json, against->comparisons[i].why_not);
+        } else {
+            comparison_json(json, &against->comparisons[i]);
             summary_json(json, "frame_ms", series_summarize(&against->rows[i].frames[0]));
             summary_json(json, "against_frame_ms", series_summarize(&against->rows[i].frames[1]));
             samples_json(json, "frame_samples_ms", &against->rows[i].frames[0]);
@@ -297,20 +299,23 @@ static Json *against_json(const Against *against, const Device *device)
     return json;
 }
 
-static void against_print_text(const Against *against, const Device *device)
+static void against_notes(const void *context, size_t row, Text *notes)
 {
-    device_heading_print(device, stdout);
-    printf("against %s; intervals of %g%% confidence\n\n", against->options->other,
-           100 * comparison_confidence);
-    for (size_t i = 0; i < against->set->count; i++) {
-        const BenchKey *key = &against->set->rows[i].key;
-        printf("%s, %ux%u, %s, %u lane%s, BVH %s, %u sample%s, %u bounce%s%s%s: %zu pair%s\n", key->scene,
-               key->width, key->height, key->precision, key->lanes, text_plural(key->lanes), key->bvh,
-               key->samples, text_plural(key->samples), key->bounces, text_plural(key->bounces),
-               key->variant && key->variant[0] ? ", " : "", key->variant ? key->variant : "",
-               against->rows[i].ratios.count, text_plural(against->rows[i].ratios.count));
-        comparison_print(&against->comparisons[i], stdout);
+    const Against *against = context;
+    const size_t pairs = against->rows[row].ratios.count;
+    if (against->comparisons[row].why_not) return;
+    text_appendf(notes, "    %zu pair%s\n", pairs, text_plural(pairs));
+    comparison_append(notes, &against->comparisons[row]);
+}
+
+static bool against_print(const Against *against, const Device *device)
+{
+    if (report_has_text(&against->options->report)) {
+        device_heading_print(device, stdout);
+        printf("against %s; intervals of %g%% confidence\n", against->options->other,
+               100 * comparison_confidence);
     }
+    return report_output(against_json(against, device), &against->options->report, against_notes, against);
 }
 
 int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device)
@@ -337,10 +342,7 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
     progress_close(&progress);
     if (status == EXIT_DONE) {
         passports_recall(device); // the workers have cached them
-        if (report_has_text(&options->report)) against_print_text(&against, device);
-        if (report_has_document(&options->report) &&
-            !report_write(against_json(&against, device), &options->report))
-            status = EXIT_USER;
+        if (!against_print(&against, device)) status = EXIT_USER;
         if (status == EXIT_DONE) status = comparisons_status(against.comparisons, set->count, options->other);
     }
     for (size_t i = 0; i < set->count; i++) {

@@ -18,34 +18,31 @@ RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_
     return row;
 }
 
-static void ratio_print(const char *of_what, const Comparison *result, FILE *stream)
+static void ratio_append(Text *notes, const char *of_what, const Comparison *result)
 {
-    fprintf(stream, "    new over old %s time: %.3f", of_what, result->ratio);
-    if (isfinite(result->high)) fprintf(stream, " (%.3f to %.3f)", result->low, result->high);
+    text_appendf(notes, "    new over old %s time: %.3f", of_what, result->ratio);
+    if (isfinite(result->high)) text_appendf(notes, " (%.3f to %.3f)", result->low, result->high);
     switch (result->verdict) {
     case VERDICT_UNDECIDED:
-        fputs(": too noisy to decide\n", stream);
+        text_appendf(notes, ": too noisy to decide\n");
         break;
     case VERDICT_SAME:
-        fprintf(stream, ": same within %.1f%%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
+        text_appendf(notes, ": same within %.1f%%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
         break;
     case VERDICT_SLOWER:
-        fprintf(stream, ": slower by at least %.1f%%\n", 100 * (result->low - 1));
+        text_appendf(notes, ": slower by at least %.1f%%\n", 100 * (result->low - 1));
         break;
     case VERDICT_FASTER:
-        fprintf(stream, ": faster by at least %.1f%%\n", 100 * (1 / result->high - 1));
+        text_appendf(notes, ": faster by at least %.1f%%\n", 100 * (1 / result->high - 1));
         break;
     }
 }
 
-void comparison_print(const RowComparison *comparison, FILE *stream)
+void comparison_append(Text *notes, const RowComparison *comparison)
 {
-    if (comparison->why_not) {
-        fprintf(stream, "    %s\n", comparison->why_not);
-        return;
-    }
-    ratio_print("frame", &comparison->frame, stream);
-    if (comparison->has_processor) ratio_print("processor", &comparison->processor, stream);
+    if (comparison->why_not) return;
+    ratio_append(notes, "frame", &comparison->frame);
+    if (comparison->has_processor) ratio_append(notes, "processor", &comparison->processor);
 }
 
 int comparisons_status(const RowComparison *comparisons, size_t count, const char *other)

@@ -24,7 +24,8 @@ typedef struct {
 RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
                           double tolerance);
 
-void comparison_print(const RowComparison *comparison, FILE *stream);
+// Appends lines with the ratios, or nothing if the row was not compared.
+void comparison_append(Text *notes, const RowComparison *comparison);
 void comparison_json(Json *json, const RowComparison *comparison); // adds the object "comparison"
 // Adds the verdict, the ratio and its interval.
 void verdict_json(Json *json, const Comparison *comparison, Verdict verdict);

@@ -16,36 +16,26 @@ const ResultTable bench_table = {
     .command = "bench",
     .rows = "runs",
     .names = {"scene", "size", "precision", "lanes", "BVH=bvh", "samples", "bounces", "variant"},
-    .values = {"frame ms=frame_ms.median", "least=frame_ms.min", "most=frame_ms.max",
-               "kernel ms=kernel_ms.median", "clock", "processor ms=processor_ms", "runs=frame_ms.runs",
-               "Mrays/s=mrays_per_s", "build ms=build_ms.cold", "mJ=energy.frame_mj", "drift=drift.verdict",
-               "to first=to_first.ratio", "verdict=comparison.verdict", "new over old=comparison.ratio"},
+    .values = {"frame ms=frame_ms.median", "min=frame_ms.min", "max=frame_ms.max",
+               "kernel ms=kernel_ms.median", "kernel min=kernel_ms.min", "kernel max=kernel_ms.max",
+               "old frame ms=against_frame_ms.median", "processor ms=processor_ms", "runs=frame_ms.runs",
+               "Mrays/s=mrays_per_s", "cold build ms=build_ms.cold", "cached build ms=build_ms.cached",
+               "mJ=energy.frame_mj", "over first=to_first"},
+    .extras = {"clock", "drift=drift.verdict", "verdict=comparison.verdict", "new over old=comparison",
+               "reason"},
     .verdicts = {"comparison.verdict"},
     .failed = "slower",
     .times = "frame_samples_ms",
     .processor_times = "processor_samples_ms",
 };
 
-static void summary_print(FILE *stream, Summary seconds)
-{
-    fprintf(stream, " %8.2f %8.2f %8.2f", 1e3 * seconds.min, 1e3 * seconds.median, 1e3 * seconds.max);
-}
-
-static void milliseconds_print(FILE *stream, int width, Figure seconds)
-{
-    if (seconds.why_not)
-        fprintf(stream, " %*s", width, "-");
-    else
-        fprintf(stream, " %*.0f", width, 1e3 * seconds.value);
-}
-
-static void launches_print(FILE *stream, const RenderReport *report)
+static void launches_append(Text *notes, const RenderReport *report)
 {
     for (size_t i = 0; i < report->launches.count; i++) {
         const LaunchTime *time = &report->launches.items[i].time;
-        fprintf(stream, "    %-9s %9.3f ms, by the host %9.3f ms%s%s\n", report->launches.items[i].name,
-                1e3 * time->event_seconds, 1e3 * time->host_seconds, time->fault ? "; " : "",
-                time->fault ? time->fault : "");
+        text_appendf(notes, "    %-9s %9.3f ms, by the host %9.3f ms%s%s\n", report->launches.items[i].name,
+                     1e3 * time->event_seconds, 1e3 * time->host_seconds, time->fault ? "; " : "",
+                     time->fault ? time->fault : "");
     }
 }
 
@@ -76,120 +66,67 @@ static bool first_compare(const BenchReport *report, size_t i, Comparison *compa
     return !first->failure;
 }
 
-static void variant_print(const BenchReport *report, size_t i, FILE *stream)
-{
-    const char *variant = report->set->rows[i].key.variant;
-    Comparison comparison;
-    if (!variant) return;
-    fprintf(stream, "    %s", variant[0] ? variant : "(no options)");
-    if (has_first(report, i)) {
-        if (first_compare(report, i, &comparison)) {
-            fprintf(stream, ": %.3f", comparison.ratio);
-            if (isfinite(comparison.high))
-                fprintf(stream, " (%.3f to %.3f)", comparison.low, comparison.high);
-            fputs(" times the first variant's frame time", stream);
-        } else {
-            fprintf(stream, ": not compared, because %s", first_unavailable);
-        }
-    }
-    fputc('\n', stream);
-}
-
 static Comparison row_drift(const BenchReport *report, const BenchRow *row)
 {
     return bench_drift(&row->times, report->device->type & CL_DEVICE_TYPE_CPU, report->set->count);
 }
 
 // Warns if the device's speed changed while it was measured.
-static void drift_print(const BenchReport *report, const BenchRow *row, FILE *stream)
+static void drift_append(Text *notes, const Comparison *drift)
 {
-    const Comparison drift = row_drift(report, row);
-    if (drift.verdict != VERDICT_SLOWER && drift.verdict != VERDICT_FASTER) return;
-    fprintf(
-        stream,
+    if (drift->verdict != VERDICT_SLOWER && drift->verdict != VERDICT_FASTER) return;
+    text_appendf(
+        notes,
         "    the last fifth of the runs took %.3f (%.3f to %.3f) times as long as the first: the device %s\n",
-        drift.ratio, drift.low, drift.high,
-        drift.verdict == VERDICT_SLOWER ? "may be throttled or shared"
-                                        : "may have been cold or shared at first");
+        drift->ratio, drift->low, drift->high,
+        drift->verdict == VERDICT_SLOWER ? "may be throttled or shared"
+                                         : "may have been cold or shared at first");
 }
 
-static void row_print(const BenchReport *report, size_t i, FILE *stream)
+static void rays_append(Text *notes, const uint64_t *rays)
 {
-    const BenchRow *row = &report->set->rows[i];
-    fprintf(stream, "  %-9s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
-    if (row->failure) {
-        fprintf(stream, "  not available: %s\n", row->failure);
-        variant_print(report, i, stream);
-        return;
-    }
-    const char *clock_fault = row->times.clock_fault;
-    summary_print(stream, series_summarize(&row->times.frame));
-    summary_print(stream, bench_kernel(&row->times));
-    fprintf(stream, "  %-5s %4zu", clock_fault ? "host" : "event", row->times.frame.count);
-    milliseconds_print(stream, 6, row->build_cold);
-    milliseconds_print(stream, 5, row->build_cached);
-    fprintf(stream, " %7.1f  %016" PRIx64 "\n", bench_rays_per_second(row) / 1e6, row->kernel_hash);
-    variant_print(report, i, stream);
-    if (clock_fault) fprintf(stream, "    using the host's clock: %s\n", clock_fault);
-    if (row->energy.source)
-        fprintf(stream, "    %.3g mJ per frame, %.3g W, by %s\n", 1e3 * row->energy.joules,
-                row->energy.joules / row->energy.seconds, row->energy.source);
-    drift_print(report, row, stream);
-    if (report->comparisons) comparison_print(&report->comparisons[i], stream);
-    const RenderReport *last = run_report(report, i);
-    if (last->device->passports != report->device->passports) passports_remark(last->device, stream);
-    if (report->lists_launches) launches_print(stream, last);
-}
-
-// Prints the reasons for missing figures, each once.
-static void reasons_print(const BenchReport *report, FILE *stream)
-{
-    const char *printed[2] = {NULL};
-    for (size_t i = 0; i < report->set->count; i++) {
-        const BenchRow *row = &report->set->rows[i];
-        if (row->failure) continue;
-        const char *reasons[2] = {row->build_cold.why_not, row->build_cached.why_not};
-        for (size_t k = 0; k < 2; k++) {
-            if (reasons[k] && !printed[k] && reasons[k] != printed[0]) fprintf(stream, "-: %s\n", reasons[k]);
-            if (reasons[k]) printed[k] = reasons[k];
-        }
-    }
-}
-
-static void rays_print(const uint64_t *rays, const char *indent, FILE *stream)
-{
-    fprintf(stream, "%srays:", indent);
+    text_appendf(notes, "    rays:");
     for (int type = 0; type < RAYS_COUNT; type++)
-        fprintf(stream, "%s %" PRIu64 " %s", type ? "," : "", rays[type],
-                type == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[type]);
-    fputc('\n', stream);
+        text_appendf(notes, "%s %" PRIu64 " %s", type ? "," : "", rays[type],
+                     type == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[type]);
+    text_appendf(notes, "\n");
 }
 
-static const char table_head[] =
-    "                                 frame ms                  kernel ms                          build ms\n"
-    "  precision lanes  bvh       min   median      max      min   median      max  clock runs   cold  kept"
-    " Mrays/s  kernel\n";
-
-void bench_print_text(const BenchReport *report, FILE *stream)
+// Returns whether a row's ray counts differ from those of the preceding measured row of its scene.
+static bool has_other_rays(const VariantSet *set, size_t row)
 {
-    device_heading_print(report->device, stream);
-    const char *scene = "";
-    const uint64_t *rays = NULL; // those last printed of the scene
-    for (size_t i = 0; i < report->set->count; i++) {
-        const BenchRow *row = &report->set->rows[i];
-        if (strcmp(scene, row->key.scene) != 0) {
-            scene = row->key.scene;
-            fprintf(stream, "\n%s, %ux%u\n", scene, row->key.width, row->key.height);
-            rays = row->failure ? NULL : row->rays;
-            if (rays) rays_print(rays, "  ", stream);
-            fputs(table_head, stream);
-        }
-        row_print(report, i, stream);
-        if (row->failure || (rays && memcmp(rays, row->rays, sizeof row->rays) == 0)) continue;
-        rays = row->rays;
-        rays_print(rays, "    ", stream);
+    const BenchRow *rows = set->rows;
+    for (size_t i = row; i-- > 0 && strcmp(rows[i].key.scene, rows[row].key.scene) == 0;)
+        if (!rows[i].failure) return memcmp(rows[i].rays, rows[row].rays, sizeof rows[row].rays) != 0;
+    return true;
+}
+
+static void bench_notes(const void *context, size_t i, Text *notes)
+{
+    const BenchReport *report = context;
+    const BenchRow *row = &report->set->rows[i];
+    if (row->failure) return;
+    const char *clock_fault = row->times.clock_fault;
+    if (has_other_rays(report->set, i)) rays_append(notes, row->rays);
+    if (clock_fault) text_appendf(notes, "    using the host's clock: %s\n", clock_fault);
+    if (row->energy.source)
+        text_appendf(notes, "    %.3g W, by %s\n", row->energy.joules / row->energy.seconds,
+                     row->energy.source);
+    const Comparison drift = row_drift(report, row);
+    drift_append(notes, &drift);
+    if (report->comparisons) comparison_append(notes, &report->comparisons[i]);
+    if (has_first(report, i) && report->set->rows[variant_set_first(report->set, i)].failure)
+        text_appendf(notes, "    not compared, because %s\n", first_unavailable);
+    const RenderReport *last = run_report(report, i);
+    Text abnormal = {0};
+    if (last->device->passports != report->device->passports) passports_abnormal(last->device, &abnormal);
+    for (const char *line = text_c(&abnormal); *line; line += strspn(line, "\n")) {
+        const int length = (int)strcspn(line, "\n");
+        text_appendf(notes, "    %.*s\n", length, line);
+        line += length;
     }
-    reasons_print(report, stream);
+    text_free(&abnormal);
+    if (report->lists_launches) launches_append(notes, last);
 }
 
 static void launches_json(Json *json, const RenderReport *report)
@@ -289,7 +226,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 
-Json *bench_json(const BenchReport *report)
+static Json *bench_json(const BenchReport *report)
 {
     Json *json = bench_json_open(report->device);
     json_begin_object(json, "calibration");
@@ -311,4 +248,10 @@ Json *bench_json(const BenchReport *report)
     }
     json_end(json);
     return json;
+}
+
+bool bench_print(const BenchReport *report, const ReportOptions *options)
+{
+    if (report_has_text(options)) device_heading_print(report->device, stdout);
+    return report_output(bench_json(report), options, bench_notes, report);
 }

@@ -14,9 +14,10 @@ typedef struct {
     const RowComparison *comparisons; // of the rows with those of the baseline, or NULL
 } BenchReport;
 
-void bench_print_text(const BenchReport *report, FILE *stream);
-Json *bench_json(const BenchReport *report); // the caller closes it
-extern const ResultTable bench_table;        // describes this report and that of --against
+// Prints and writes the report as the options ask. Returns false with a message if the file cannot be
+// written.
+bool bench_print(const BenchReport *report, const ReportOptions *options);
+extern const ResultTable bench_table; // describes this report and that of --against
 
 // The functions below print parts of a report and are shared with glint bench --against.
 Json *bench_json_open(const Device *device); // opens a report with its device, date, host and build

@@ -22,9 +22,10 @@ static const ResultTable certify_table = {
     .rows = "precisions",
     .names = {"scene", "size", "precision"},
     .values = {"pixels=compared", "wrong objects=wrong.object", "wrong shadows=wrong.shadow",
-               "wrong paths=wrong.path", "wrong colors=wrong.color", "largest error=color.max_right",
-               "largest wrong=color.max_wrong", "certain and wrong=wrong_decided",
-               "uncertain=uncertified.pixels", "claim"},
+               "wrong paths=wrong.path", "wrong colors=wrong.color", "error of right colors=color.max_right",
+               "error of wrong colors=color.max_wrong", "margin of wrong=wrong.margin",
+               "wrong but certified=wrong_decided", "uncertified=uncertified.pixels", "claim"},
+    .extras = {"reason"},
     .verdicts = {"claim"},
     .failed = "broken",
 };
@@ -69,50 +70,54 @@ typedef struct {
     CertifyRow rows[PRECISION_COUNT];
 } Certification;
 
-static void certified_print(const CertifyErrors *errors, const CertifyUncertified *uncertified)
+static void certified_append(Text *notes, const CertifyErrors *errors, const CertifyUncertified *uncertified)
 {
-    printf("             colors are certified to %.2g of their largest channel, or of 1 if that is more\n",
-           CERTIFIED_COLOR_ERROR);
+    text_appendf(notes,
+                 "    colors are certified to %.2g of their largest channel, or of 1 if that is more\n",
+                 CERTIFIED_COLOR_ERROR);
     if (errors->unconfirmed > 0)
-        printf("             certified decides %zu pixel%s that the reference leaves uncertain; %zu of them "
-               "differ from it\n",
-               errors->unconfirmed, text_plural(errors->unconfirmed), errors->contradicted);
+        text_appendf(notes,
+                     "    certified decides %zu pixel%s that the reference leaves uncertain, of which %zu "
+                     "differ from it\n",
+                     errors->unconfirmed, text_plural(errors->unconfirmed), errors->contradicted);
     if (uncertified->count == 0) return;
-    printf(
-        "             %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
-        "are within 2^-49, %zu neither\n",
-        uncertified->count, text_plural(uncertified->count), uncertified->examined, uncertified->witnessed,
-        uncertified->close, uncertified->examined - uncertified->witnessed - uncertified->close);
+    text_appendf(notes,
+                 "    %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
+                 "are within "
+                 "2^-49, %zu neither\n",
+                 uncertified->count, text_plural(uncertified->count), uncertified->examined,
+                 uncertified->witnessed, uncertified->close,
+                 uncertified->examined - uncertified->witnessed - uncertified->close);
 }
 
-static void text_print(const Certification *certification)
+static void certify_notes(const void *context, size_t row, Text *notes)
+{
+    const Certification *certification = context;
+    unsigned precision = 0;
+    for (;; precision++) {
+        const CertifyRow *at = &certification->rows[precision];
+        if ((at->measured || at->failure) && row-- == 0) break;
+    }
+    const CertifyErrors *errors = &certification->rows[precision].errors;
+    if (!certification->rows[precision].measured) return;
+    text_appendf(notes, "    the largest error of color is at %u,%u\n", errors->worst[0], errors->worst[1]);
+    if (precision == PRECISION_CERTIFIED)
+        certified_append(notes, errors, &certification->rows[precision].uncertified);
+}
+
+static void heading_print(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
-    const size_t uncertain = certification->uncertain_count;
     size_t textured = 0;
     for (size_t i = 0; i < sample->count; i++)
         textured += sample->pixels[i].has_texture;
     device_heading_print(certification->compute->device, stdout);
-    printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
-           sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
-           certification->reference_seconds);
-    if (uncertain > 0) printf("; %zu that it leaves uncertain are not counted", uncertain);
+    printf("%zu pixel%s, reference of %d bits in %.1f s", sample->count, text_plural(sample->count),
+           (int)QUAD_BITS, certification->reference_seconds);
+    if (certification->uncertain_count > 0)
+        printf("; %zu that it leaves uncertain are not counted", certification->uncertain_count);
     if (textured > 0) printf("; the colors of %zu with a texture are not compared", textured);
-    puts("\n                         wrong                 largest error of color        largest margin\n"
-         "  precision   object  shadow    path   color   right     wrong     at         of a wrong pixel");
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
-        const CertifyRow *row = &certification->rows[i];
-        const CertifyErrors *errors = &row->errors;
-        if (row->failure) printf("  %-9s  unavailable: %s\n", precision_names[i], row->failure);
-        if (!row->measured) continue;
-        printf("  %-9s  %7zu %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
-               errors->shadow, errors->path, errors->color, errors->right_color, errors->wrong_color,
-               errors->worst[0], errors->worst[1]);
-        if (errors->object + errors->shadow + errors->path + errors->color > 0)
-            printf("    %.2g of the distance", errors->margin);
-        putchar('\n');
-        if (i == PRECISION_CERTIFIED) certified_print(errors, &row->uncertified);
-    }
+    putchar('\n');
 }
 
 static void row_json(Json *json, Precision precision, const CertifyRow *row)
@@ -243,9 +248,9 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
             status = precision_compare(&certification, settings, (Precision)i);
     }
     const ReportOptions *report = &options->common.report;
-    if (status == EXIT_DONE && report_has_text(report)) text_print(&certification);
-    if (status == EXIT_DONE && report_has_document(report) &&
-        !report_write(certify_json(&certification), report))
+    if (status == EXIT_DONE && report_has_text(report)) heading_print(&certification);
+    if (status == EXIT_DONE &&
+        !report_output(certify_json(&certification), report, certify_notes, &certification))
         status = EXIT_USER;
     if (status == EXIT_DONE) status = violations_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)

@@ -79,91 +79,8 @@ const char *report_options_check(void *common)
     return NULL;
 }
 
-// A row with the objects that its columns may come from.
-typedef struct {
-    const json_t *sources[3]; // the row, the object around it, the document
-} ReportRow;
-
-static const json_t *member_at(const json_t *object, const char *path)
-{
-    for (const char *dot; object && (dot = strchr(path, '.')) != NULL; path = dot + 1) {
-        char name[64];
-        snprintf(name, sizeof name, "%.*s", (int)(dot - path), path);
-        object = json_object_get(object, name);
-    }
-    return json_object_get(object, path);
-}
-
-static const json_t *value_at(const ReportRow *row, const char *path)
-{
-    const json_t *value = NULL;
-    for (size_t i = 0; i < 3 && !value; i++)
-        value = row->sources[i] ? member_at(row->sources[i], path) : NULL;
-    return value;
-}
-
-static void value_append(Text *text, const json_t *value)
-{
-    json_type type = value ? json_typeof(value) : JSON_NULL;
-    switch (type) {
-    case JSON_STRING:
-        text_append(text, json_string_value(value), json_string_length(value));
-        break;
-    case JSON_INTEGER:
-        text_appendf(text, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
-        break;
-    case JSON_REAL:
-        text_appendf(text, "%s", text_number(json_real_value(value), 1).text);
-        break;
-    case JSON_TRUE:
-    case JSON_FALSE:
-        text_appendf(text, json_is_true(value) ? "true" : "false");
-        break;
-    case JSON_ARRAY: // a size
-        for (size_t i = 0; i < json_array_size(value); i++) {
-            if (i > 0) text_appendf(text, "x");
-            value_append(text, json_array_get(value, i));
-        }
-        break;
-    case JSON_OBJECT: // a figure that is not available
-        value_append(text, json_object_get(value, "reason"));
-        break;
-    case JSON_NULL:
-        break;
-    }
-}
-
-ShortText column_heading(const char *column)
-{
-    ShortText heading;
-    snprintf(heading.text, sizeof heading.text, "%.*s", (int)strcspn(column, "="), column);
-    return heading;
-}
-
-static const json_t *column_value(const ReportRow *row, const char *column)
-{
-    const char *equals = strchr(column, '=');
-    return value_at(row, equals ? equals + 1 : column);
-}
-
-static Text column_text(const ReportRow *row, const char *column)
-{
-    Text text = {0};
-    value_append(&text, column_value(row, column));
-    return text;
-}
-
-// Returns a column, of which the names are first, or NULL past the last.
-static const char *column_at(const ResultTable *table, size_t index)
-{
-    size_t name_count = 0;
-    while (table->names[name_count])
-        name_count++;
-    return index < name_count ? table->names[index] : table->values[index - name_count];
-}
-
 // Appends the row's name, which consists of its first columns that have a value, separated by `between`.
-static void name_append(Text *text, const ReportRow *row, const ResultTable *table, const char *between)
+static void name_append(Text *text, const ResultRow *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; table->names[i]; i++) {
         Text value = column_text(row, table->names[i]);
@@ -174,11 +91,9 @@ static void name_append(Text *text, const ReportRow *row, const ResultTable *tab
 
 typedef enum { ROW_PASSED, ROW_FAILED, ROW_UNAVAILABLE } RowOutcome;
 
-static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
+static RowOutcome row_outcome(const ResultRow *row, const ResultTable *table)
 {
-    const json_t *status = json_object_get(row->sources[0], "status");
-    if (json_is_string(status) && strcmp(json_string_value(status), "unavailable") == 0)
-        return ROW_UNAVAILABLE;
+    if (row_unavailable(row)) return ROW_UNAVAILABLE;
     const json_t *verdict = NULL;
     for (size_t i = 0; i < 2 && table->verdicts[i] && !verdict; i++)
         verdict = member_at(row->sources[0], table->verdicts[i]);
@@ -222,9 +137,9 @@ typedef struct {
     size_t row_count;
 } Writing;
 
-typedef void RowWriter(Writing *writing, const ReportRow *row);
+typedef void RowWriter(Writing *writing, const ResultRow *row);
 
-static void csv_row(Writing *writing, const ReportRow *row)
+static void csv_row(Writing *writing, const ResultRow *row)
 {
     const char *column;
     for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
@@ -238,16 +153,11 @@ static void csv_row(Writing *writing, const ReportRow *row)
     text_appendf(&writing->body, "\n");
 }
 
-static void markdown_row(Writing *writing, const ReportRow *row)
+static void markdown_row(Writing *writing, const ResultRow *row)
 {
     const char *column;
     for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
-        const json_t *member = column_value(row, column);
-        Text value = {0};
-        if (json_is_real(member))
-            text_appendf(&value, "%.4g", json_real_value(member));
-        else
-            value_append(&value, member);
+        Text value = column_text_short(row, column);
         text_appendf(&writing->body, "| ");
         escaped_append(&writing->body, text_c(&value), markdown_escapes);
         text_appendf(&writing->body, " ");
@@ -257,7 +167,7 @@ static void markdown_row(Writing *writing, const ReportRow *row)
 }
 
 // Appends the values that are not in the row's name, for readers of a failure.
-static void details_append(Text *text, const ReportRow *row, const ResultTable *table)
+static void details_append(Text *text, const ResultRow *row, const ResultTable *table)
 {
     const size_t start = text->count;
     for (size_t i = 0; table->values[i]; i++) {
@@ -269,7 +179,7 @@ static void details_append(Text *text, const ReportRow *row, const ResultTable *
     }
 }
 
-static void junit_row(Writing *writing, const ReportRow *row)
+static void junit_row(Writing *writing, const ResultRow *row)
 {
     Text name = {0}, details = {0}, *body = &writing->body;
     name_append(&name, row, writing->table, " ");
@@ -280,7 +190,7 @@ static void junit_row(Writing *writing, const ReportRow *row)
     const json_t *seconds = writing->table->seconds ? value_at(row, writing->table->seconds) : NULL;
     if (json_is_number(seconds)) text_appendf(body, "\" time=\"%.6f", json_number_value(seconds));
     if (outcome == ROW_UNAVAILABLE)
-        value_append(&details, json_object_get(row->sources[0], "reason"));
+        text_appendf(&details, "%s", row_unavailable(row));
     else
         details_append(&details, row, writing->table);
     text_appendf(body, outcome == ROW_PASSED ? "\">\n    <system-out>" : "\">\n    <%s message=\"",
@@ -293,7 +203,7 @@ static void junit_row(Writing *writing, const ReportRow *row)
 
 // Writes one entry per run, as google/benchmark does with repetitions, so that its tools compare
 // distributions. The times are milliseconds; its compare.py prints no decimals, hence microseconds.
-static void benchmark_row(Writing *writing, const ReportRow *row)
+static void benchmark_row(Writing *writing, const ResultRow *row)
 {
     Text name = {0};
     name_append(&name, row, writing->table, "/");
@@ -320,21 +230,10 @@ static void benchmark_row(Writing *writing, const ReportRow *row)
 
 static void rows_write(Writing *writing, RowWriter *write)
 {
-    const char *path = writing->table->rows, *dot = strchr(path, '.');
-    const json_t *document = writing->document;
-    if (*path == '\0') {
-        write(writing, &(ReportRow){{document, NULL, NULL}});
-        return;
-    }
-    char name[64];
-    snprintf(name, sizeof name, "%.*s", dot ? (int)(dot - path) : (int)strlen(path), path);
-    const json_t *outer = json_object_get(document, name);
-    for (size_t i = 0; i < json_array_size(outer); i++) {
-        const json_t *item = json_array_get(outer, i), *inner = dot ? json_object_get(item, dot + 1) : NULL;
-        if (!dot) write(writing, &(ReportRow){{item, NULL, document}});
-        for (size_t k = 0; k < json_array_size(inner); k++)
-            write(writing, &(ReportRow){{json_array_get(inner, k), item, document}});
-    }
+    ResultRows rows = result_rows(writing->document, writing->table);
+    for (size_t i = 0; i < rows.count; i++)
+        write(writing, &rows.items[i]);
+    free(rows.items);
 }
 
 static void headings_append(Writing *writing, const char *before, const char *between, const char *after)
@@ -392,25 +291,50 @@ static void document_write(Writing *writing, ReportFormat format, Text *text)
     text_append(text, writing->body.items, writing->body.count);
 }
 
-bool report_write(Json *json, const ReportOptions *options)
+static json_t *document_load(const Text *document)
 {
-    Text document = json_close(json), text = {0};
-    if (options->format == FORMAT_JSON) {
-        text = document;
-    } else {
-        Writing writing = {.table = options->table,
-                           .document = json_loadb(text_c(&document), document.count, JSON_ALLOW_NUL, NULL)};
-        if (!writing.document) fault("JSON: a report cannot be read back");
+    json_t *loaded = json_loadb(text_c(document), document->count, JSON_ALLOW_NUL, NULL);
+    if (!loaded) fault("JSON: a report cannot be read back");
+    return loaded;
+}
+
+// Writes a document in the options' format, which is not FORMAT_TEXT.
+static bool document_output(const Text *document, const ReportOptions *options)
+{
+    Text text = {0};
+    if (options->format != FORMAT_JSON) {
+        Writing writing = {.table = options->table, .document = document_load(document)};
         document_write(&writing, options->format, &text);
         text_free(&writing.body);
         json_decref((json_t *)writing.document);
-        text_free(&document);
     }
+    const Text *written = options->format == FORMAT_JSON ? document : &text;
     MessageList messages = {0};
     if (!options->output) output_open(&report_file, "-", &messages);
-    fwrite(text_c(&text), 1, text.count, report_file.file);
-    const bool written = output_commit(&report_file, &messages);
+    fwrite(text_c(written), 1, written->count, report_file.file);
+    const bool is_written = output_commit(&report_file, &messages);
     messages_print(&messages, NULL);
     text_free(&text);
-    return written;
+    return is_written;
+}
+
+bool report_write(Json *json, const ReportOptions *options)
+{
+    Text document = json_close(json);
+    const bool is_written = document_output(&document, options);
+    text_free(&document);
+    return is_written;
+}
+
+bool report_output(Json *json, const ReportOptions *options, RowNotes *notes, const void *context)
+{
+    Text document = json_close(json);
+    if (report_has_text(options)) {
+        json_t *loaded = document_load(&document);
+        result_text_print(loaded, options->table, notes, context, stdout);
+        json_decref(loaded);
+    }
+    const bool is_written = !report_has_document(options) || document_output(&document, options);
+    text_free(&document);
+    return is_written;
 }

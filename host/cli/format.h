@@ -4,6 +4,7 @@
 
 #include "host/base/json.h"
 #include "host/cli/command_line.h"
+#include "host/cli/result_text.h"
 
 typedef enum {
     FORMAT_TEXT,
@@ -15,27 +16,6 @@ typedef enum {
     FORMAT_COUNT
 } ReportFormat;
 
-enum { RESULT_NAMES_MAX = 8, RESULT_VALUES_MAX = 16 };
-
-// Describes a command's results as rows.
-typedef struct {
-    const char *command;
-    // The path of the array of rows, such as "scenes.variants" for one array in each object of another. If it
-    // is "", the document is the only row.
-    const char *rows;
-    // The columns that name a row, and the others, up to NULL, as "path" or "heading=path". The path names a
-    // member, with dots between members, such as "frame_ms.median". It is looked up in the row, then in the
-    // object whose array has the row, then in the document.
-    const char *names[RESULT_NAMES_MAX + 1], *values[RESULT_VALUES_MAX + 1];
-    // The paths of verdicts, up to NULL, and the value with which a row has failed: "true", "false" or a
-    // text. The first verdict that the row has counts.
-    const char *verdicts[2], *failed;
-    // The paths of times in milliseconds for FORMAT_BENCHMARK, one per row or one per run, or NULL if the
-    // command measures none.
-    const char *times, *processor_times;
-    const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
-} ResultTable;
-
 typedef struct {
     const ResultTable *table; // describes the command's results
     ReportFormat format;
@@ -44,9 +24,6 @@ typedef struct {
     // text.
     const char *output;
 } ReportOptions;
-
-// Returns the heading of a column.
-ShortText column_heading(const char *column);
 
 extern const Option format_option, timed_format_option; // the latter of commands that measure times
 
@@ -78,3 +55,6 @@ static inline bool report_has_document(const ReportOptions *options)
 // Writes the report in the options' format, which is not FORMAT_TEXT, and frees it. Returns false with a
 // message if the file cannot be written.
 bool report_write(Json *json, const ReportOptions *options);
+// Prints the report's rows as text, with notes, and writes the report in the options' format, each only if
+// the options request it. Frees the report. Returns false as report_write does.
+bool report_output(Json *json, const ReportOptions *options, RowNotes *notes, const void *context);
