@@ -101,30 +101,73 @@ static void bounded_free(Bounded *bounded)
     free(bounded->places);
 }
 
-// Moves the struct at from[i] to i for every i, cycle by cycle in place, which saves a second array.
-// Destroys `from`.
+enum { CACHE_LINE = 64, CUT_DISTANCE = 256 };
+
+// A permutation of an array in place, which saves a second array. Its cycles are cut in every place that is a
+// multiple of CUT_DISTANCE, so that threads can move the structs of different paths between cuts.
+typedef struct {
+    FlatArray *array;
+    uint32_t *from; // each place's struct is in this place, or in its own once it has been moved
+    char *saved;    // copies of the structs in the places of cuts, then of one in another place
+} Permutation;
+
+static void *saved_at(const Permutation *permutation, size_t cut)
+{
+    return permutation->saved + cut * permutation->array->layout.size;
+}
+
+// Moves the structs of a path that ends where the next place is a cut or the first place, whose structs are
+// saved.
+static void path_move(const Permutation *permutation, uint32_t first, const void *saved_first)
+{
+    const FlatArray *array = permutation->array;
+    uint32_t *from = permutation->from, place = first, next;
+    const size_t size = array->layout.size;
+    for (;;) {
+        next = from[place];
+        from[place] = place;
+        if (next % CUT_DISTANCE == 0 || next == first) break;
+        const uint32_t later = from[next];
+        const char *ahead = flat_array_at(array, later % CUT_DISTANCE > 0 ? from[later] : later);
+        for (size_t k = 0; k < size; k += CACHE_LINE)
+            __builtin_prefetch(ahead + k, 1);
+        memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
+        place = next;
+    }
+    const void *last = next % CUT_DISTANCE > 0 ? saved_first : saved_at(permutation, next / CUT_DISTANCE);
+    memcpy(flat_array_at(array, place), last, size);
+}
+
+static void range_save_cuts(void *context, size_t begin, size_t end)
+{
+    const Permutation *permutation = context;
+    const FlatArray *array = permutation->array;
+    for (size_t i = begin; i < end; i++)
+        memcpy(saved_at(permutation, i), flat_array_at(array, i * CUT_DISTANCE), array->layout.size);
+}
+
+static void range_move_paths(void *context, size_t begin, size_t end)
+{
+    for (size_t i = begin; i < end; i++)
+        path_move(context, (uint32_t)(i * CUT_DISTANCE), NULL);
+}
+
+// Moves the struct at from[i] to i for every i. Destroys `from`.
 static void array_permute(FlatArray *array, uint32_t *from)
 {
-    enum { CACHE_LINE = 64 };
-    const size_t size = array->layout.size;
-    void *first = memory_allocate(1, size);
-    for (uint32_t i = 0; i < array->count; i++) {
+    const size_t cut_count = (array->count + CUT_DISTANCE - 1) / CUT_DISTANCE;
+    Permutation permutation = {.array = array};
+    permutation.from = from;
+    permutation.saved = memory_allocate(cut_count + 1, array->layout.size);
+    parallel_run(cut_count, FLAT_RANGE_MIN / CUT_DISTANCE, range_save_cuts, &permutation);
+    parallel_run(cut_count, FLAT_RANGE_MIN / CUT_DISTANCE, range_move_paths, &permutation);
+    void *saved_first = saved_at(&permutation, cut_count);
+    for (uint32_t i = 0; i < array->count; i++) { // cycles without a cut
         if (from[i] == i) continue;
-        memcpy(first, flat_array_at(array, i), size);
-        uint32_t place = i;
-        while (from[place] != i) {
-            const uint32_t next = from[place];
-            const char *later = flat_array_at(array, from[from[next]]);
-            for (size_t k = 0; k < size; k += CACHE_LINE)
-                __builtin_prefetch(later + k, 1);
-            memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
-            from[place] = place;
-            place = next;
-        }
-        memcpy(flat_array_at(array, place), first, size);
-        from[place] = place;
+        memcpy(saved_first, flat_array_at(array, i), array->layout.size);
+        path_move(&permutation, i, saved_first);
     }
-    free(first);
+    free(permutation.saved);
 }
 
 typedef struct {
