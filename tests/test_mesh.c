@@ -40,8 +40,7 @@ TEST(vertices_are_joined)
     assert_int_equal(mesh->triangle_count, 2);
     assert_null(mesh->normals);
     assert_int_equal(scene_primitive_count(&scene), 2);
-    size_t unbounded_count;
-    Bounds bounds = scene_bounds(&scene, &unbounded_count);
+    const Bounds bounds = scene_extent(&scene).bounds;
     assert_vector(bounds.min, 0, 0, 0);
     assert_vector(bounds.max, 1, 1, 0);
 }

@@ -103,8 +103,7 @@ TEST(what_no_face_uses_does_not_count)
         OwnedScene scene = scene_of_objects(formatted("  - mesh: {file: %s}\n", cases[i].name));
         assert_int_equal(scene.meshes.items[0].triangle_count, 1);
         assert_int_equal(scene.meshes.items[0].vertex_count, 3);
-        size_t unbounded_count;
-        Bounds bounds = scene_bounds(&scene, &unbounded_count);
+        const Bounds bounds = scene_extent(&scene).bounds;
         assert_vector(bounds.min, 0, 0, 0);
         assert_vector(bounds.max, 1, 1, 0);
     }

@@ -8,10 +8,9 @@
 static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)
 {
     OwnedScene scene = scene_of_text("s.yaml", formatted(CAMERA "%s", objects));
-    size_t unbounded_count;
-    Bounds bounds = scene_bounds(&scene, &unbounded_count);
-    assert_int_equal(unbounded_count, expected_unbounded_count);
-    return bounds;
+    const SceneExtent extent = scene_extent(&scene);
+    assert_int_equal(extent.unbounded_count, expected_unbounded_count);
+    return extent.bounds;
 }
 
 TEST(sphere_box_triangle)

@@ -75,8 +75,7 @@ TEST(materials)
 TEST(square_on_the_floor)
 {
     OwnedScene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
-    size_t unbounded_count;
-    Bounds bounds = scene_bounds(&scene, &unbounded_count);
+    const Bounds bounds = scene_extent(&scene).bounds;
     assert_vector(bounds.min, -1, 0, -1);
     assert_vector(bounds.max, 1, 0, 1);
 }

@@ -52,8 +52,8 @@ static const CommandLine command_line = {
     .check = options_check};
 
 typedef struct {
-    size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
-    Bounds bounds;
+    size_t shapes[SHAPE_COUNT], mesh_triangle_count;
+    SceneExtent extent;
     FeatureSet features;
 } SceneFacts;
 
@@ -65,7 +65,7 @@ static SceneFacts facts_of(const Scene *scene)
         facts.shapes[object_shape(object)]++;
         if (object->type == SHAPE_MESH) facts.mesh_triangle_count += object_primitive_count(scene, object);
     }
-    facts.bounds = scene_bounds(scene, &facts.unbounded_count);
+    facts.extent = scene_extent(scene);
     facts.features = features_of(scene);
     return facts;
 }
@@ -92,12 +92,12 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf(" (of %zu triangle%s)", facts->mesh_triangle_count, text_plural(facts->mesh_triangle_count));
     printf("\n  lights     %zu\n  materials  %zu\n  bounds     ", scene->lights.count,
            scene->materials.count);
-    Vector3 low = facts->bounds.min, high = facts->bounds.max;
-    if (bounds_is_empty(&facts->bounds))
+    Vector3 low = facts->extent.bounds.min, high = facts->extent.bounds.max;
+    if (bounds_is_empty(&facts->extent.bounds))
         printf("none");
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
-    if (facts->unbounded_count > 0) printf(", plus %zu unbounded", facts->unbounded_count);
+    if (facts->extent.unbounded_count > 0) printf(", plus %zu unbounded", facts->extent.unbounded_count);
     if (scene->animation.frame_count > 0) printf("\n  frames     %" PRIu32, scene->animation.frame_count);
     if (scene->animation.frame_rate > 0) printf("\n  fps        %g", scene->animation.frame_rate);
     printf("\n  features  ");
@@ -125,16 +125,16 @@ static void messages_json(Json *json, const char *key, MessageSeverity severity,
 static void facts_json(Json *json, const Scene *scene)
 {
     const SceneFacts facts = facts_of(scene);
-    const Vector3 low = facts.bounds.min, high = facts.bounds.max;
+    const Vector3 low = facts.extent.bounds.min, high = facts.extent.bounds.max;
     json_count(json, "objects", scene->objects.count);
     json_begin_object(json, "shapes");
     for (size_t type = 0; type < SHAPE_COUNT; type++)
         if (type != SHAPE_OVAL) json_count(json, shape_names[type], facts.shapes[type]);
     json_end(json);
     json_addf(json, "mesh_triangles %zu unbounded %zu lights %zu materials %zu frames %u fps %g",
-              facts.mesh_triangle_count, facts.unbounded_count, scene->lights.count, scene->materials.count,
-              scene->animation.frame_count, scene->animation.frame_rate);
-    if (bounds_is_empty(&facts.bounds))
+              facts.mesh_triangle_count, facts.extent.unbounded_count, scene->lights.count,
+              scene->materials.count, scene->animation.frame_count, scene->animation.frame_rate);
+    if (bounds_is_empty(&facts.extent.bounds))
         json_none(json, "bounds");
     else
         json_addf(json, "bounds {min [%g %g %g] max [%g %g %g]}", low.x, low.y, low.z, high.x, high.y,

@@ -69,8 +69,9 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
                    MessageList *messages)
 {
     double start = clock_seconds();
-    sizes_check(scene, settings, messages);
-    *compiled = (CompiledScene){.unit = scene_unit(scene, settings)};
+    const SceneExtent extent = scene_extent(scene);
+    sizes_check(scene, &extent, settings, messages);
+    *compiled = (CompiledScene){.unit = scene_unit(scene, &extent, settings)};
     Scene scaled = {0};
     if (compiled->unit != 1) scaled = scene_scaled(scene, 1 / compiled->unit);
     bool done = stages_run(compiled, compiled->unit != 1 ? &scaled : scene, settings, messages);
@@ -121,7 +122,8 @@ bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettin
                 MessageList *messages)
 {
     double start = clock_seconds();
-    const double unit = scene_unit(scene, settings);
+    const SceneExtent extent = scene_extent(scene);
+    const double unit = scene_unit(scene, &extent, settings);
     if (unit != 1 || compiled->unit != 1) {
         CompiledScene moved;
         if (!scene_compile(&moved, scene, settings, messages)) return false;

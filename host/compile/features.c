@@ -47,18 +47,22 @@ static FeatureSet material_features(const Material *material)
 
 FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
 {
-    FeatureSet set = 0;
-    bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
+    bool *is_used = memory_allocate_zeroed(scene->materials.count, sizeof *is_used),
+         *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        set |= of(&scene->materials.items[object->material]);
+        is_used[object->material] = true;
         if (object->type != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         const uint32_t *materials = mesh_materials(mesh, object);
         is_done[object->as.mesh.index] = materials != NULL;
         for (size_t k = 0; materials && k < mesh->triangle_count; k++)
-            set |= of(&scene->materials.items[materials[k]]);
+            is_used[materials[k]] = true;
     }
+    FeatureSet set = 0;
+    for (size_t i = 0; i < scene->materials.count; i++)
+        if (is_used[i]) set |= of(&scene->materials.items[i]);
+    free(is_used);
     free(is_done);
     return set;
 }

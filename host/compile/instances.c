@@ -147,6 +147,7 @@ bool object_is_instance(const Object *object)
 uint32_t *instance_uses(const Scene *scene)
 {
     uint32_t *uses = memory_allocate_zeroed(scene->meshes.count, sizeof *uses);
+    if (scene->meshes.count == 0) return uses;
     for (size_t i = 0; i < scene->objects.count; i++)
         if (object_is_instance(&scene->objects.items[i])) uses[scene->objects.items[i].as.mesh.index]++;
     return uses;
@@ -156,7 +157,8 @@ uint32_t *instance_uses(const Scene *scene)
 static bool sharing_is_wanted(const Scene *scene, const CompileSettings *settings)
 {
     size_t count = 0;
-    if (settings->certifies || settings->instances == INSTANCES_COPIED) return false;
+    if (settings->certifies || settings->instances == INSTANCES_COPIED || scene->meshes.count == 0)
+        return false;
     for (size_t i = 0; i < scene->objects.count; i++)
         if (object_is_instance(&scene->objects.items[i]))
             count += object_primitive_count(scene, &scene->objects.items[i]);

@@ -24,7 +24,7 @@ bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *m
                              largest);
     size_t unshared = 0;
     uint32_t *uses = instance_uses(scene);
-    for (size_t i = 0; i < scene->objects.count; i++) {
+    for (size_t i = 0; scene->meshes.count > 0 && i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object_is_instance(object) && uses[object->as.mesh.index] > 1 && instance_mesh(compiled, i) == 0)
             unshared += object_primitive_count(scene, object);
@@ -43,15 +43,6 @@ typedef struct {
     double size;
 } Extreme;
 
-// Returns the second largest side of a box, or the largest if the others are 0: the size of what has a length
-// and a flat or round section.
-static double box_width(const Bounds *bounds)
-{
-    const Vector3 size = vector_subtract(bounds->max, bounds->min);
-    const double middle = fmax(fmin(size.x, size.y), fmin(fmax(size.x, size.y), size.z));
-    return middle > 0 ? middle : vector_largest(size);
-}
-
 // Returns the shape of an object and its line. The caller frees it.
 static char *extreme_describe(const Scene *scene, const Extreme *extreme)
 {
@@ -63,23 +54,29 @@ static char *extreme_describe(const Scene *scene, const Extreme *extreme)
                        scene->included.items[object->file - 1].path);
 }
 
-void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages)
+// Returns the distance of a box's farthest side from the eye, along an axis.
+static double box_reach(const Bounds *bounds, Vector3 eye)
+{
+    return fmax(vector_largest(vector_subtract(bounds->min, eye)),
+                vector_largest(vector_subtract(bounds->max, eye)));
+}
+
+void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings,
+                 MessageList *messages)
 {
     const double detail = 1e-12;
     if (settings->precision == PRECISION_DOUBLE || settings->certifies) return;
     const Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    if (!(extent->least_width < detail * box_reach(&extent->bounds, eye))) return;
     Extreme farthest = {NULL, 0}, smallest = {NULL, INFINITY};
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Bounds bounds = object_bounds(scene, object);
         if (bounds_is_everywhere(&bounds)) continue;
-        const double reach = fmax(vector_largest(vector_subtract(bounds.min, eye)),
-                                  vector_largest(vector_subtract(bounds.max, eye)));
-        const double width = box_width(&bounds);
+        const double reach = box_reach(&bounds, eye), width = box_width(&bounds);
         if (reach > farthest.size) farthest = (Extreme){object, reach};
         if (width > 0 && width < smallest.size) smallest = (Extreme){object, width};
     }
-    if (!farthest.object || !(smallest.size < detail * farthest.size)) return;
     char *names[] = {extreme_describe(scene, &farthest), extreme_describe(scene, &smallest)};
     message_warning(
         messages,

@@ -4,5 +4,14 @@
 #include "host/scene/bounds.h"
 #include "host/scene/scene.h"
 
-// Returns the bounds of all bounded objects. Sets *unbounded_count to the number of the others.
-Bounds scene_bounds(const Scene *scene, size_t *unbounded_count);
+typedef struct {
+    Bounds bounds;          // of all bounded objects
+    size_t unbounded_count; // of the others
+    double least_width;     // of all boxes whose width is not 0, infinite if there are none
+} SceneExtent;
+
+SceneExtent scene_extent(const Scene *scene);
+
+// Returns the second largest side of a box, or the largest if the others are 0: the size of what has a length
+// and a flat or round section.
+double box_width(const Bounds *bounds);

@@ -3,16 +3,18 @@
 
 #include "host/compile/compile.h"
 #include "host/compile/rounding.h"
+#include "host/compile/scene_bounds.h"
 
 // limits.c: Returns false with a message if the scene has more primitives than ids, more unshared ones than
 // a BVH counts, or more copies than instances may have.
 bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages);
 
 // limits.c: Warns of a scene whose sizes differ by more than a trillion, if the precision is in float.
-void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages);
+void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings,
+                 MessageList *messages);
 
 // units.c: Returns the scene units per unit of length on the device, a power of two, 1 for most scenes.
-double scene_unit(const Scene *scene, const CompileSettings *settings);
+double scene_unit(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings);
 
 // limits.c: Returns false with a message if `certified` has no error bounds for a feature of the scene.
 bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages);

@@ -1,4 +1,3 @@
-#include "host/compile/scene_bounds.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <stdlib.h>
@@ -25,13 +24,12 @@ static double smallest_size(const Scene *scene)
 // within 2^-30, the unit is the geometric mean of its distance and the smallest object's size, which puts
 // them on the two sides of 1, unless that would enlarge a large scene. Powers of two are exact, so the image
 // is that of the scene as it is.
-double scene_unit(const Scene *scene, const CompileSettings *settings)
+double scene_unit(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings)
 {
     if (settings->precision == PRECISION_DOUBLE) return 1;
     const int harmless = 30; // exponents up to there
     Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
-    size_t unbounded_count;
-    Bounds bounds = scene_bounds(scene, &unbounded_count);
+    const Bounds bounds = extent->bounds;
     if (bounds_is_empty(&bounds)) return 1;
     int farthest, smallest;
     frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);

@@ -178,6 +178,7 @@ size_t object_primitive_count(const Scene *scene, const Object *object)
 
 size_t scene_primitive_count(const Scene *scene)
 {
+    if (scene->meshes.count == 0) return scene->objects.count;
     size_t count = 0;
     for (size_t i = 0; i < scene->objects.count; i++)
         count += object_primitive_count(scene, &scene->objects.items[i]);
