@@ -356,4 +356,54 @@ TEST(device_without_room_is_reported)
     assert_refused(&compute, &scene, "has 64 bytes, and");
 }
 
+// Triangles without a vertex normal or an image leave gaps among the places that were counted for them.
+TEST(attributes_of_many_triangles_follow_each_other)
+{
+    enum { COUNT = 3 * FLAT_RANGE_MIN };
+    file_write("a.ppm", "P6 1 1 255\nabc");
+    OwnedScene scene = scene_of_text("scene.yaml", CAMERA_AND_LIGHT
+                                     "materials: {plain: {}, seen: {image: a.ppm}}\n"
+                                     "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: plain}},\n"
+                                     "          {sphere: {center: [0, 0, 0], radius: 1, material: seen}}]\n");
+    const uint32_t materials[] = {scene.objects.items[0].material, scene.objects.items[1].material};
+    Mesh mesh = {.vertices = memory_allocate(3 * COUNT, sizeof *mesh.vertices),
+                 .normals = memory_allocate_zeroed(3 * COUNT, sizeof *mesh.normals),
+                 .uvs = memory_allocate(3 * COUNT, sizeof *mesh.uvs),
+                 .vertex_count = 3 * COUNT,
+                 .triangles = memory_allocate(COUNT, sizeof *mesh.triangles),
+                 .materials = memory_allocate(COUNT, sizeof *mesh.materials),
+                 .triangle_count = COUNT};
+    for (uint32_t i = 0; i < COUNT; i++) {
+        for (uint32_t k = 0; k < 3; k++) {
+            const uint32_t vertex = 3 * i + k;
+            mesh.vertices[vertex] = (Vector3){i, k == 1, k == 2};
+            if (i % 1000 != 7) mesh.normals[vertex] = (Vector3){i + 1, 0, 0};
+            mesh.uvs[vertex][0] = mesh.uvs[vertex][1] = i;
+            mesh.triangles[i][k] = vertex;
+        }
+        mesh.materials[i] = materials[i % 3 > 0];
+    }
+    array_push(scene.meshes, mesh);
+    array_push(scene.objects, ((Object){.type = SHAPE_MESH, .as.mesh.index = 0}));
+    const CompileSettings settings = {
+        .width = 1, .height = 1, .sample_count = 1, .lanes = 1, .bvh = BVH_OFF, .shift_to_eye = true};
+    CompiledScene compiled = scene_compiled(&scene, &settings);
+    const Triangle *triangles = compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].items;
+    const TriangleNormals *normals = compiled.arrays[FLAT_TRIANGLE_NORMALS].items;
+    const TriangleUvs *uvs = compiled.arrays[FLAT_TRIANGLE_UVS].items;
+    const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
+    uint32_t normals_count = 0, uvs_count = 0;
+    for (uint32_t i = 0; i < COUNT; i++) {
+        assert_int_equal(triangles[i].id.x, 2 + i);
+        assert_int_equal(entries[2 + i].type_index_material.y, i);
+        assert_int_equal(triangles[i].id.y, i % 1000 == 7 ? 0 : ++normals_count);
+        if (i % 1000 != 7) assert_true(normals[normals_count - 1].a.x == i + 1);
+        assert_int_equal(triangles[i].id.z, i % 3 == 0 ? 0 : ++uvs_count);
+        if (i % 3 > 0) assert_true(uvs[uvs_count - 1].a_b.x == i);
+    }
+    assert_int_equal(compiled.arrays[FLAT_TRIANGLE_NORMALS].count, normals_count);
+    assert_int_equal(compiled.arrays[FLAT_TRIANGLE_UVS].count, uvs_count);
+    compiled_scene_free(&compiled);
+}
+
 TEST_MAIN(meshes_open, meshes_close)

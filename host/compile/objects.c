@@ -1,3 +1,4 @@
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/instances.h"
@@ -41,48 +42,113 @@ bool primitive_set_power(Flattening *flattening, double power, uint4 *id)
     return true;
 }
 
-static void arrays_make(CompiledScene *compiled, const Scene *scene)
+// Consecutive primitives that one thread flattens.
+typedef struct {
+    size_t first_object, first_part;
+    size_t count;
+    // The counts before and after the range. `before` assumes that every triangle of a mesh with normals or
+    // texture coordinates uses them.
+    Flattening before, after;
+} FlatteningRange;
+
+typedef ARRAY_OF(FlatteningRange) FlatteningRanges;
+
+// Appends the ranges of an object's primitives. `flattening` counts what is flattened before them.
+static void object_divide(FlatteningRanges *ranges, Flattening *flattening, size_t index)
 {
-    size_t counts[TYPE_COUNT] = {0}, normals_count = 0, uvs_count = 0;
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
-        size_t count = object_primitive_count(scene, object);
-        if (instance_mesh(compiled, i) > 0) {
-            counts[TYPE_INSTANCES]++;
-            continue;
-        }
-        counts[shape_primitive_type(object->type)] += count;
-        if (object_is_smooth(scene, object)) normals_count += count;
-        if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
+    const Scene *scene = flattening->scene;
+    const Object *object = &scene->objects.items[index];
+    const size_t primitive_count = object_primitive_count(scene, object);
+    const bool is_shared = instance_mesh(flattening->compiled, index) > 0,
+               is_smooth = !is_shared && object_is_smooth(scene, object),
+               has_uvs = !is_shared && object->type == SHAPE_MESH && scene->textures.count > 0 &&
+                         scene->meshes.items[object->as.mesh.index].uvs;
+    const size_t type = is_shared ? TYPE_INSTANCES : shape_primitive_type(object->type),
+                 count = is_shared ? 1 : primitive_count;
+    for (size_t part = 0, step; part < count; part += step) {
+        if (flattening->entry_count % FLAT_RANGE_MIN == 0)
+            array_push(*ranges, ((FlatteningRange){index, part, 0, *flattening, *flattening}));
+        FlatteningRange *range = &ranges->items[ranges->count - 1];
+        const size_t space = FLAT_RANGE_MIN - range->count;
+        step = count - part < space ? count - part : space;
+        range->count += step;
+        flattening->entry_count += step;
+        flattening->counts[type] += step;
+        flattening->primitive_count += is_shared ? primitive_count : step;
+        if (is_smooth) flattening->normals_count += step;
+        if (has_uvs) flattening->uvs_count += step;
     }
+}
+
+static void arrays_make(CompiledScene *compiled, const Flattening *all)
+{
     for (size_t type = 0; type < TYPE_COUNT; type++)
-        flat_array_renew(compiled, FLAT_FIRST_SHAPE + type, counts[type]);
-    flat_array_renew(compiled, FLAT_TRIANGLE_NORMALS, normals_count);
-    flat_array_renew(compiled, FLAT_TRIANGLE_UVS, uvs_count);
-    const InstancePlan *plan = compiled->instances;
-    const size_t instance_count = plan ? plan->instance_count : 0;
-    flat_array_renew(compiled, FLAT_OBJECTS,
-                     scene_primitive_count(scene) - (plan ? plan->triangle_count : 0) + instance_count);
-    flat_array_renew(compiled, FLAT_SHARED_MESHES, plan ? plan->mesh_count : 0);
-    flat_array_renew(compiled, FLAT_INSTANCE_IDS, instance_count);
+        flat_array_renew(compiled, FLAT_FIRST_SHAPE + type, all->counts[type]);
+    flat_array_renew(compiled, FLAT_TRIANGLE_NORMALS, all->normals_count);
+    flat_array_renew(compiled, FLAT_TRIANGLE_UVS, all->uvs_count);
+    flat_array_renew(compiled, FLAT_OBJECTS, all->entry_count);
+    flat_array_renew(compiled, FLAT_SHARED_MESHES, compiled->instances ? compiled->instances->mesh_count : 0);
+    flat_array_renew(compiled, FLAT_INSTANCE_IDS, all->counts[TYPE_INSTANCES]);
+}
+
+static void ranges_flatten(void *context, size_t begin, size_t end)
+{
+    for (size_t at = begin; at < end; at++) {
+        FlatteningRange *range = &((FlatteningRange *)context)[at];
+        Flattening flattening = range->before;
+        const size_t entries_end = flattening.entry_count + range->count;
+        flattening.part = range->first_part;
+        for (size_t i = range->first_object; flattening.entry_count < entries_end; i++) {
+            const Object *object = &flattening.scene->objects.items[i];
+            const size_t count = object_primitive_count(flattening.scene, object);
+            const uint32_t shared = instance_mesh(flattening.compiled, i);
+            if (shared > 0) instance_flatten(&flattening, object, shared - 1);
+            for (; shared == 0 && flattening.part < count && flattening.entry_count < entries_end;
+                 flattening.part++)
+                shape_ops[object->type]->flatten(&flattening, object);
+            flattening.part = 0;
+        }
+        range->after = flattening;
+    }
+}
+
+// Moves the normals and texture coordinates of a range down to the given places.
+static void range_move_attributes(const FlatteningRange *range, size_t first_normals, size_t first_uvs)
+{
+    const Flattening *before = &range->before, *after = &range->after;
+    const FlatArray *arrays = before->compiled->arrays;
+    Triangle *triangles = arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].items;
+    TriangleNormals *normals = arrays[FLAT_TRIANGLE_NORMALS].items;
+    TriangleUvs *uvs = arrays[FLAT_TRIANGLE_UVS].items;
+    for (size_t i = before->counts[TYPE_TRIANGLES]; i < after->counts[TYPE_TRIANGLES]; i++) {
+        if (triangles[i].id.y > 0) triangles[i].id.y -= (uint32_t)(before->normals_count - first_normals);
+        if (triangles[i].id.z > 0) triangles[i].id.z -= (uint32_t)(before->uvs_count - first_uvs);
+    }
+    memmove(normals + first_normals, normals + before->normals_count,
+            (after->normals_count - before->normals_count) * sizeof *normals);
+    memmove(uvs + first_uvs, uvs + before->uvs_count, (after->uvs_count - before->uvs_count) * sizeof *uvs);
 }
 
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
-    arrays_make(compiled, scene);
-    Flattening flattening = {.compiled = compiled, .scene = scene, .rounding = *rounding};
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        const size_t count = object_primitive_count(scene, object);
-        const uint32_t shared = instance_mesh(compiled, i);
-        if (shared > 0) instance_flatten(&flattening, object, shared - 1);
-        for (flattening.part = 0; shared == 0 && flattening.part < count; flattening.part++)
-            shape_ops[object->type]->flatten(&flattening, object);
+    Flattening all = {.compiled = compiled, .scene = scene, .rounding = *rounding};
+    FlatteningRanges ranges = {0};
+    for (size_t i = 0; i < scene->objects.count; i++)
+        object_divide(&ranges, &all, i);
+    arrays_make(compiled, &all);
+    parallel_run(ranges.count, 1, ranges_flatten, ranges.items);
+    size_t normals_count = 0, uvs_count = 0;
+    for (size_t i = 0; i < ranges.count; i++) {
+        const Flattening *before = &ranges.items[i].before, *after = &ranges.items[i].after;
+        if (normals_count < before->normals_count || uvs_count < before->uvs_count)
+            range_move_attributes(&ranges.items[i], normals_count, uvs_count);
+        normals_count += after->normals_count - before->normals_count;
+        uvs_count += after->uvs_count - before->uvs_count;
+        compiled->features |= after->features;
     }
-    compiled->features |= flattening.features;
-    compiled->arrays[FLAT_TRIANGLE_NORMALS].count = flattening.normals_count;
-    compiled->arrays[FLAT_TRIANGLE_UVS].count = flattening.uvs_count;
+    compiled->arrays[FLAT_TRIANGLE_NORMALS].count = normals_count;
+    compiled->arrays[FLAT_TRIANGLE_UVS].count = uvs_count;
+    free(ranges.items);
 }
 
 typedef struct {
