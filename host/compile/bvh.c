@@ -203,7 +203,7 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count
         .count = count,
         .leaves = leaves,
         .references = memory_allocate_large(count, sizeof *builder.references),
-        .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
+        .nodes = memory_allocate_large(count + 1, sizeof *builder.nodes),
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
         .lock = PTHREAD_MUTEX_INITIALIZER,
         .bounds = range_bounds_empty(),

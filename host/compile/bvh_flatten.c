@@ -6,6 +6,7 @@
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -29,14 +30,39 @@ typedef struct {
 typedef struct {
     const FlatArray *array;
     size_t type;
-    Bounds *boxes; // of the array's primitives
+    Bounded *bounded; // the array's primitives follow those that it counts
+    atomic_bool has_unbounded;
 } Boxing;
 
 static void range_box(void *context, size_t begin, size_t end)
 {
-    const Boxing *boxing = context;
-    for (size_t i = begin; i < end; i++)
-        boxing->boxes[i] = primitive_bounds(boxing->type, flat_array_at(boxing->array, i));
+    Boxing *boxing = context;
+    const Bounded *bounded = boxing->bounded;
+    bool has_unbounded = false;
+    for (size_t i = begin, k = bounded->count + begin; i < end; i++, k++) {
+        bounded->boxes[k] = primitive_bounds(boxing->type, flat_array_at(boxing->array, i));
+        bounded->types[k] = (uint8_t)boxing->type;
+        bounded->places[k] = (uint32_t)i;
+        has_unbounded |= bounds_is_everywhere(&bounded->boxes[k]);
+    }
+    if (has_unbounded) atomic_store(&boxing->has_unbounded, true);
+}
+
+// Adds the bounded ones of `count` primitives behind those that are counted.
+static void bounded_add(Bounded *bounded, size_t type, size_t count, bool has_unbounded)
+{
+    const size_t first = bounded->count;
+    bounded->count += count;
+    if (has_unbounded) {
+        bounded->count = first;
+        for (size_t i = first; i < first + count; i++) {
+            if (bounds_is_everywhere(&bounded->boxes[i])) continue;
+            bounded->boxes[bounded->count] = bounded->boxes[i];
+            bounded->types[bounded->count] = bounded->types[i];
+            bounded->places[bounded->count++] = bounded->places[i];
+        }
+    }
+    bounded->type_counts[type] = (uint32_t)(bounded->count - first);
 }
 
 static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
@@ -45,27 +71,23 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
     for (size_t type = 0; type < TYPE_COUNT; type++)
         capacity += compiled->arrays[FLAT_FIRST_SHAPE + type].count;
     *bounded = (Bounded){
-        .boxes = memory_allocate(capacity, sizeof(Bounds)),
+        .boxes = memory_allocate_large(capacity, sizeof(Bounds)),
         .types = memory_allocate(capacity, 1),
         .places = memory_allocate(capacity, sizeof(uint32_t)),
     };
     for (size_t type = 0; type < TYPE_COUNT; type++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
-        Boxing boxing = {array, type, bounded->boxes + bounded->count};
+        Boxing boxing = {array, type, bounded, false};
         parallel_run(array->count, FLAT_RANGE_MIN, range_box, &boxing);
-        for (size_t i = 0; i < array->count; i++) {
-            if (bounds_is_everywhere(&boxing.boxes[i])) continue;
-            bounded->boxes[bounded->count] = boxing.boxes[i];
-            bounded->types[bounded->count] = (uint8_t)type;
-            bounded->places[bounded->count++] = (uint32_t)i;
-            bounded->type_counts[type]++;
-        }
+        bounded_add(bounded, type, array->count, boxing.has_unbounded);
     }
 }
 
-static double box_size(const Bounds *box)
+static inline double box_size(const Bounds *box)
 {
-    return vector_largest(vector_subtract(box->max, box->min));
+    const Vector3 size = vector_subtract(box->max, box->min);
+    const double larger = size.x > size.y ? size.x : size.y; // a call of fmax would take longer
+    return larger > size.z ? larger : size.z;
 }
 
 static void bounded_remove(Bounded *bounded, size_t index)
@@ -81,9 +103,12 @@ static void huge_remove(Bounded *bounded)
 {
     while (bounded->count > 1) {
         size_t largest = 0;
-        for (size_t i = 1; i < bounded->count; i++)
-            if (box_size(&bounded->boxes[i]) > box_size(&bounded->boxes[largest])) largest = i;
-        const double size = box_size(&bounded->boxes[largest]);
+        double size = box_size(&bounded->boxes[0]);
+        for (size_t i = 1; i < bounded->count; i++) {
+            if (!(box_size(&bounded->boxes[i]) > size)) continue;
+            largest = i;
+            size = box_size(&bounded->boxes[i]);
+        }
         Bounds others = bounds_empty();
         for (size_t i = 0; i < bounded->count; i++) {
             if (i == largest) continue;
@@ -191,7 +216,7 @@ static void array_reorder(CompiledScene *compiled, size_t type, const Bvh *bvh, 
 {
     FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
     if (array->count == 0) return;
-    uint32_t *from = memory_allocate(array->count, sizeof *from);
+    uint32_t *from = memory_allocate_large(array->count, sizeof *from);
     bool *in_tree = memory_allocate_zeroed(array->count, sizeof *in_tree);
     size_t count = 0;
     for (size_t i = 0; i < bvh->primitive_count; i++) {

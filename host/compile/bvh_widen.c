@@ -159,14 +159,14 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
     double root_area = bounds_half_area(bvh_node_bounds(&bvh->nodes[0]));
     Widening widening = {
         .bvh = bvh,
-        .subtrees = memory_allocate(bvh->node_count, sizeof(Subtree)),
+        .subtrees = memory_allocate_large(bvh->node_count, sizeof(Subtree)),
         .scale = root_area >= DBL_MIN && root_area <= DBL_MAX ? 1 / root_area : 0,
         .width = width,
     };
     costs_find(&widening);
     uint32_t *roots = memory_allocate(bvh->node_count, sizeof *roots);
     *wide = (BvhWide){
-        .nodes = memory_allocate(bvh->node_count, sizeof *wide->nodes),
+        .nodes = memory_allocate_large(bvh->node_count, sizeof *wide->nodes),
         .node_count = 1,
         .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // leaves are not nested
     };
