@@ -131,16 +131,6 @@ static inline integer tile_slots(const Tile *tile)
 FILM_STORE(film_store, scalar, real, RealLanes)
 FILM_STORE(film_store_integer, int, integer, IntegerLanes)
 
-// Shuffles each row of four lanes of two vectors. i, j, k and l are lanes of the first row, where LANES is
-// the second vector's first lane.
-#if LANES == 16 && defined(__clang__)
-#define SHUFFLE_ROWS(a, b, i, j, k, l)                                                                       \
-    __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8,        \
-                            i + 12, j + 12, k + 12, l + 12)
-#elif LANES == 8 && defined(__clang__)
-#define SHUFFLE_ROWS(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
-#endif
-
 #ifdef SHUFFLE_ROWS
 // Interleaves a tile's colors: `parts` of a row of four pixels are r g b r, g b r g and b r g b.
 static inline void color_interleave(Vector color, real *parts)
@@ -177,12 +167,6 @@ static inline void film_store_vector(global scalar *film, const Tile *tile, Vect
 
 #if LANES == 16 && defined(SHUFFLE_ROWS)
 typedef real UnalignedReal __attribute__((aligned(sizeof(scalar)))); // PoCL's vstore16 stores halves
-
-// Selects rows i and j of a, followed by those of b.
-#define SELECT_ROWS(a, b, i, j)                                                                              \
-    __builtin_shufflevector(a, b, 4 * (i), 4 * (i) + 1, 4 * (i) + 2, 4 * (i) + 3, 4 * (j), 4 * (j) + 1,      \
-                            4 * (j) + 2, 4 * (j) + 3, 4 * (i) + 16, 4 * (i) + 17, 4 * (i) + 18,              \
-                            4 * (i) + 19, 4 * (j) + 16, 4 * (j) + 17, 4 * (j) + 18, 4 * (j) + 19)
 
 // Stores the colors of four neighboring tiles, whose rows together fill cache lines.
 static inline void film_store_four(global scalar *film, const Tile *tile, const Vector *colors)

@@ -323,40 +323,88 @@ typedef union {
     scalar each[MINIMA_COUNT];
 } LaneMinima;
 
+// A row is four lanes. SHUFFLE_ROWS shuffles each row of two vectors by the lanes i, j, k and l of the first
+// one, where LANES is the second vector's first lane. SELECT_ROWS selects rows i and j of a, followed by
+// those of b.
+#if LANES == 16 && defined(__clang__)
+#define SHUFFLE_ROWS(a, b, i, j, k, l)                                                                       \
+    __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8,        \
+                            i + 12, j + 12, k + 12, l + 12)
+#define SELECT_ROWS(a, b, i, j)                                                                              \
+    __builtin_shufflevector(a, b, 4 * (i), 4 * (i) + 1, 4 * (i) + 2, 4 * (i) + 3, 4 * (j), 4 * (j) + 1,      \
+                            4 * (j) + 2, 4 * (j) + 3, 4 * (i) + 16, 4 * (i) + 17, 4 * (i) + 18,              \
+                            4 * (i) + 19, 4 * (j) + 16, 4 * (j) + 17, 4 * (j) + 18, 4 * (j) + 19)
+#elif LANES == 8 && defined(__clang__)
+#define SHUFFLE_ROWS(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
+#endif
+
 #if LANES > 1
-static inline real real_min_of_pairs(real a, real b)
+// Packs two vectors into one by comparing neighboring lanes, within rows if these can be shuffled, because
+// lanes move between rows more slowly.
+static inline real minima_pack(real a, real b)
 {
+#ifdef SHUFFLE_ROWS
+    return real_min(SHUFFLE_ROWS(a, b, 0, 2, LANES, LANES + 2),
+                    SHUFFLE_ROWS(a, b, 1, 3, LANES + 1, LANES + 3));
+#else
     return real_min((real)(a.even, b.even), (real)(a.odd, b.odd));
+#endif
+}
+
+// Packs vectors that minima_of_four returned.
+static inline real minima_pack_halves(real a, real b)
+{
+#ifdef SHUFFLE_ROWS
+    return real_min((real)(a.lo, b.lo), (real)(a.hi, b.hi));
+#else
+    return minima_pack(a, b);
+#endif
+}
+
+// Packs vectors that minima_pack_halves returned.
+static inline real minima_pack_rows(real a, real b)
+{
+#ifdef SELECT_ROWS
+    return real_min(SELECT_ROWS(a, b, 0, 2), SELECT_ROWS(a, b, 1, 3));
+#else
+    return minima_pack(a, b);
+#endif
+}
+
+// Packs four vectors into one, in which each row has one minimum per vector or, if rows cannot be shuffled,
+// each vector's minima are neighbors.
+static inline real minima_of_four(const real *vectors)
+{
+    return minima_pack(minima_pack(vectors[0], vectors[1]), minima_pack(vectors[2], vectors[3]));
 }
 
 // Returns the smallest lane of each of LANES vectors, one lane per vector.
 static inline real lanes_smallest_of_each(const real *vectors)
 {
-    real smallest[LANES];
-    for (uint i = 0; i < LANES; i++)
-        smallest[i] = vectors[i];
-    for (uint count = LANES >> 1; count > 0; count >>= 1)
-        for (uint i = 0; i < count; i++)
-            smallest[i] = real_min_of_pairs(smallest[2 * i], smallest[2 * i + 1]);
-    return smallest[0];
+    real minima = minima_of_four(vectors);
+#if LANES > 4
+    minima = minima_pack_halves(minima, minima_of_four(vectors + 4));
+#endif
+#if LANES > 8
+    minima = minima_pack_rows(minima,
+                              minima_pack_halves(minima_of_four(vectors + 8), minima_of_four(vectors + 12)));
+#endif
+    return minima;
 }
 #endif
 
-// Replaces eight vectors by their smallest lanes. Comparing lanes in pairs packs two vectors into one, so
-// that all eight take little longer than one. It is unrolled, so that they stay in registers.
+// Replaces eight vectors by their smallest lanes. Unrolled, so that the vectors stay in registers.
 static inline void lane_minima_reduce(LaneMinima *minima)
 {
 #if LANES > 1
     real *all = minima->all;
-    real first = real_min_of_pairs(all[0], all[1]), second = real_min_of_pairs(all[2], all[3]);
-    real third = real_min_of_pairs(all[4], all[5]), fourth = real_min_of_pairs(all[6], all[7]);
-    all[0] = real_min_of_pairs(first, second);
-    all[1] = real_min_of_pairs(third, fourth);
+    all[0] = minima_of_four(all);
+    all[1] = minima_of_four(all + 4);
 #if LANES > 4
-    all[0] = real_min_of_pairs(all[0], all[1]);
+    all[0] = minima_pack_halves(all[0], all[1]);
 #endif
 #if LANES > 8
-    all[0] = real_min_of_pairs(all[0], all[0]);
+    all[0] = minima_pack_rows(all[0], all[0]);
 #endif
 #endif
 }
