@@ -1,6 +1,7 @@
 #include "host/import/yaml/tree.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 
 #include <errno.h>
 #include <libfyaml.h>
@@ -24,6 +25,7 @@ typedef struct {
 typedef struct {
     YamlTree *tree;
     Report *report;
+    const Source *parsed;
     size_t root; // index of the source's first node
     size_t base; // of the offsets of the source's nodes
     OpenNode open[DEPTH_MAX];
@@ -50,10 +52,16 @@ static void node_append(TreeBuilder *builder, YamlNode node)
     parent->last_child = index;
 }
 
-// Appends a token's text by chunks, because libfyaml 0.7's fy_token_get_text leaks on some quoted texts of
-// several lines, and its fy_token_iter_read returns chunks in the wrong order.
-static bool token_append_text(Text *text, struct fy_token *token)
+// Appends a token's text. A plain text of one line consists of its bytes in the source. Other texts are
+// appended by chunks, because libfyaml 0.7's fy_token_get_text leaks on some quoted texts of several lines,
+// and its fy_token_iter_read returns chunks in the wrong order.
+static bool token_append_text(Text *text, struct fy_token *token, const Source *parsed)
 {
+    const struct fy_mark *start = fy_token_start_mark(token), *end = fy_token_end_mark(token);
+    if (fy_token_scalar_style(token) == FYSS_PLAIN && start->line == end->line) {
+        text_append(text, parsed->bytes + start->input_pos, end->input_pos - start->input_pos);
+        return true;
+    }
     struct fy_token_iter *iterator = fy_token_iter_create(token);
     if (!iterator) fault("libfyaml: out of memory");
     const struct fy_iter_chunk *chunk = NULL;
@@ -69,7 +77,7 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
     Text *texts = &builder->tree->texts;
     node.type = YAML_SCALAR;
     node.text = (uint32_t)texts->count;
-    if (token && !token_append_text(texts, token))
+    if (token && !token_append_text(texts, token, builder->parsed))
         return report_error(builder->report, node.offset, "not well-formed YAML");
     text_append(texts, "", 1);
     if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1))
@@ -101,7 +109,7 @@ static const Anchor *anchor_find(const TreeBuilder *builder, const char *name, s
 {
     for (size_t i = builder->anchors.count; i-- > 0;) {
         const Anchor *anchor = &builder->anchors.items[i];
-        if (anchor->length == length && !memcmp(builder->report->source->bytes + anchor->text, name, length))
+        if (anchor->length == length && !memcmp(builder->parsed->bytes + anchor->text, name, length))
             return anchor;
     }
     return NULL;
@@ -234,15 +242,37 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
     return true;
 }
 
+// Returns whether all of eight bytes are ASCII characters other than NUL.
+static bool are_ascii(const char *bytes)
+{
+    const uint64_t ones = 0x0101010101010101;
+    uint64_t eight;
+    memcpy(&eight, bytes, sizeof eight);
+    return ((eight | (eight - ones)) & (ones << 7)) == 0;
+}
+
 // Returns whether the source is UTF-8 without NUL, and reports an error otherwise. On other bytes libfyaml
 // 0.7 stops or never returns.
 static bool source_is_text(const Source *source, Report *report)
 {
     for (size_t at = 0, size; at < source->length; at += size) {
+        size = sizeof(uint64_t);
+        if (source->length - at >= size && are_ascii(source->bytes + at)) continue;
         size = text_character_size(source->bytes + at, source->length - at);
         if (!size || !source->bytes[at]) return report_error(report, at, "not UTF-8 text");
     }
     return true;
+}
+
+// Reserves what a large source usually needs, on large pages. Pages take memory once they are written.
+static void tree_reserve(YamlTree *tree, size_t length)
+{
+    enum { BYTES_PER_NODE = 6 };
+    if (tree->nodes.items || length < MEMORY_LARGE_MIN) return;
+    tree->nodes.capacity = length / BYTES_PER_NODE;
+    tree->nodes.items = memory_allocate_large(tree->nodes.capacity, sizeof(YamlNode));
+    tree->texts.capacity = length;
+    tree->texts.items = memory_allocate_large(length, 1);
 }
 
 // Parses `parsed`, which is the report's source or a text of the same length.
@@ -251,6 +281,7 @@ static bool source_read(YamlTree *tree, Report *report, size_t base, const Sourc
     if (base > source_length_max || parsed->length > source_length_max - base)
         return report_error(report, 0, "a scene of more than 2 GiB");
     if (!source_is_text(report->source, report)) return false;
+    tree_reserve(tree, parsed->length);
     struct fy_diag_cfg quiet;
     fy_diag_cfg_default(&quiet);
     quiet.fp = NULL;
@@ -262,7 +293,8 @@ static bool source_read(YamlTree *tree, Report *report, size_t base, const Sourc
     if (!parser || fy_parser_set_string(parser, parsed->bytes, parsed->length))
         fault("libfyaml: cannot make a parser");
 
-    TreeBuilder builder = {.tree = tree, .report = report, .root = tree->nodes.count, .base = base};
+    TreeBuilder builder = {
+        .tree = tree, .report = report, .parsed = parsed, .root = tree->nodes.count, .base = base};
     errno = 0;
     bool built = tree_build(&builder, parser, diagnostics, parsed, stage);
     free(builder.anchors.items);
