@@ -24,6 +24,12 @@ static void nodes_compare(const YamlTree *got, uint32_t got_node, const YamlTree
     assert_int_equal(other, 0);
 }
 
+// Returns whether the error means that the text is not for libfyaml.
+static bool is_refused(const char *error)
+{
+    return strcmp(error, "not UTF-8 text") == 0 || strstr(error, "in a text with tabs");
+}
+
 // Returns whether the text could be parsed in parts. Its tree then equals that of the whole, and otherwise it
 // is empty.
 static bool parts_check(const char *text, size_t length)
@@ -33,8 +39,8 @@ static bool parts_check(const char *text, size_t length)
     MessageList messages = {0};
     Report report = report_open(&source, &messages);
     const bool is_whole = yaml_tree_read(&whole, &report, 7, NULL),
-               is_text = is_whole || strcmp(messages.items[0].text, "not UTF-8 text") != 0,
-               is_joined = is_text && yaml_parts_read(&joined, &source, 7, 1, NULL);
+               is_joined = (is_whole || !is_refused(messages.items[0].text)) &&
+                           yaml_parts_read(&joined, &source, 7, 1, NULL);
     if (is_joined) {
         assert_true(is_whole);
         assert_int_equal(joined.nodes.count, whole.nodes.count);
@@ -112,10 +118,10 @@ static size_t below(uint64_t *random, size_t limit)
 static void text_edit(Text *text, uint64_t *random)
 {
     static const char *const words[] = {
-        "",    " ",       "  ",       "\n",  "\r\n", "- ",  "  - ", "\n  - a", "\n- ",      ": ",
-        ":",   "? ",      "#",        " # ", "[",    "]",   "{",    "}",       ",",         "'",
-        "\"",  "|",       "|1\n",     ">\n", "&a ",  "*a ", "!",    "%",       "@",         "`",
-        "---", "\n...\n", "\xC2\x85", "\\",  "\r",   "-",   "a",    "\n b\n",  "objects:\n"};
+        "",        " ",        "  ",  "\n",  "\r\n", "- ", "  - ",   "\n  - a",   "\n- ", ": ", ":",
+        "? ",      "#",        " # ", "[",   "]",    "{",  "}",      ",",         "'",    "\"", "|",
+        "|1\n",    ">\n",      "&a ", "*a ", "!",    "%",  "@",      "`",         "\t",   "? ", "---",
+        "\n...\n", "\xC2\x85", "\\",  "\r",  "-",    "a",  "\n b\n", "objects:\n"};
     const size_t start = below(random, text->count + 1), rest = text->count - start,
                  removed = rest > 0 ? below(random, rest < 4 ? rest + 1 : 4) : 0;
     const bool is_copy = below(random, 8) == 0 && text->count > 0 && text->count < 400;
@@ -142,8 +148,7 @@ TEST(parts_of_edited_texts_equal_the_whole)
         text_append(&text, start, strlen(start));
         for (size_t edits = below(&random, EDITS_MAX) + 1; edits > 0; edits--)
             text_edit(&text, &random);
-        // libfyaml 0.7 crashes at some tabs before dashes
-        if (!strchr(text.items, '\t')) joined += parts_check(text.items, text.count);
+        joined += parts_check(text.items, text.count);
         text_free(&text);
     }
     assert_in_range(joined, EDITED_COUNT / 10, EDITED_COUNT);

@@ -4,6 +4,7 @@
 #include "host/import/yaml/parse.h"
 #include "host/import/yaml/parts.h"
 
+#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,6 +33,39 @@ static bool source_is_text(const Source *source, Report *report)
     return true;
 }
 
+static bool is_blank(char character)
+{
+    return character == ' ' || character == '\t' || character == '\r' || character == '\n';
+}
+
+// Returns whether a '?' between blanks may begin a key, because indicators, an anchor or a tag, or nothing is
+// before it in its line.
+static bool may_begin_key(const char *start, const char *at)
+{
+    while (at > start && (at[-1] == ' ' || at[-1] == '\t'))
+        at--;
+    if (at == start || !isascii(at[-1]) || strchr("\r\n-?:[{,", at[-1])) return true;
+    while (at > start && !is_blank(at[-1]))
+        at--;
+    return *at == '&' || *at == '!';
+}
+
+// Reports a '?' that may begin a key in a text with tabs, because libfyaml 0.7 frees memory twice at a tab
+// after such a key.
+static bool source_is_safe(const Source *source, Report *report)
+{
+    const char *start = source->bytes, *end = start + source->length;
+    if (!memchr(start, '\t', source->length)) return true;
+    for (const char *at = start; (at = memchr(at, '?', (size_t)(end - at))); at++) {
+        const bool is_apart =
+            (at == start || is_blank(at[-1]) || !isascii(at[-1])) && (at + 1 == end || is_blank(at[1]));
+        if (is_apart && may_begin_key(start, at))
+            return report_error(report, (size_t)(at - start),
+                                "a '?' that begins a key in a text with tabs; replace the tabs by spaces");
+    }
+    return true;
+}
+
 // Reserves what a large source usually needs, on large pages. Pages take memory once they are written.
 static void tree_reserve(YamlTree *tree, size_t length)
 {
@@ -48,7 +82,7 @@ static bool source_is_valid(const Source *source, Report *report, size_t base)
 {
     if (base > source_length_max || source->length > source_length_max - base)
         return report_error(report, 0, "a scene of more than 2 GiB");
-    return source_is_text(source, report);
+    return source_is_text(source, report) && source_is_safe(source, report);
 }
 
 bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage)
@@ -64,12 +98,12 @@ bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage)
 bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start)
 {
     const Source *source = report->source;
-    if (!source_is_valid(source, report, base)) return false;
     Text blanked = {0}; // has the same offsets as the source
     text_append(&blanked, source->bytes, source->length);
     memset(blanked.items, ' ', start);
     const Source parsed = {.bytes = blanked.items, .length = blanked.count};
-    const bool is_read = yaml_parse(tree, report, base, &parsed, NULL, NULL);
+    const bool is_read =
+        source_is_valid(&parsed, report, base) && yaml_parse(tree, report, base, &parsed, NULL, NULL);
     text_free(&blanked);
     return is_read;
 }
