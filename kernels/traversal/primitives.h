@@ -237,7 +237,7 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 {
     const uint first = block_first(scene, index);
     uint near = (1u << count) - 1;
-    if (popcount(lanes) < count) { // the shorter loop
+    if (popcount(lanes) <= count) { // the shorter loop
         near = 0;
         for (; lanes != 0; lanes &= lanes - 1)
             near |= block_triangles_near(&scene->triangle_blocks[index], count, ray, lowest_bit(lanes));
