@@ -126,7 +126,7 @@ static void bounded_free(Bounded *bounded)
     free(bounded->places);
 }
 
-enum { CACHE_LINE = 64, CUT_DISTANCE = 256 };
+enum { CACHE_LINE = 64, CUT_DISTANCE = 256, PATHS_AT_ONCE = 8 };
 
 // A permutation of an array in place, which saves a second array. Its cycles are cut in every place that is a
 // multiple of CUT_DISTANCE, so that threads can move the structs of different paths between cuts.
@@ -141,28 +141,6 @@ static void *saved_at(const Permutation *permutation, size_t cut)
     return permutation->saved + cut * permutation->array->layout.size;
 }
 
-// Moves the structs of a path that ends where the next place is a cut or the first place, whose structs are
-// saved.
-static void path_move(const Permutation *permutation, uint32_t first, const void *saved_first)
-{
-    const FlatArray *array = permutation->array;
-    uint32_t *from = permutation->from, place = first, next;
-    const size_t size = array->layout.size;
-    for (;;) {
-        next = from[place];
-        from[place] = place;
-        if (next % CUT_DISTANCE == 0 || next == first) break;
-        const uint32_t later = from[next];
-        const char *ahead = flat_array_at(array, later % CUT_DISTANCE > 0 ? from[later] : later);
-        for (size_t k = 0; k < size; k += CACHE_LINE)
-            __builtin_prefetch(ahead + k, 1);
-        memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
-        place = next;
-    }
-    const void *last = next % CUT_DISTANCE > 0 ? saved_first : saved_at(permutation, next / CUT_DISTANCE);
-    memcpy(flat_array_at(array, place), last, size);
-}
-
 static void range_save_cuts(void *context, size_t begin, size_t end)
 {
     const Permutation *permutation = context;
@@ -171,10 +149,48 @@ static void range_save_cuts(void *context, size_t begin, size_t end)
         memcpy(saved_at(permutation, i), flat_array_at(array, i * CUT_DISTANCE), array->layout.size);
 }
 
+// Moves the structs of paths from cut to cut, several by turns, so that those of one are fetched while others
+// are moved.
 static void range_move_paths(void *context, size_t begin, size_t end)
 {
-    for (size_t i = begin; i < end; i++)
-        path_move(context, (uint32_t)(i * CUT_DISTANCE), NULL);
+    const Permutation *permutation = context;
+    const FlatArray *array = permutation->array;
+    const size_t size = array->layout.size;
+    uint32_t *from = permutation->from, places[PATHS_AT_ONCE];
+    size_t count = 0, start = begin;
+    while (count < PATHS_AT_ONCE && start < end)
+        places[count++] = (uint32_t)(start++ * CUT_DISTANCE);
+    for (size_t k = 0; count > 0; k = k + 1 < count ? k + 1 : 0) {
+        const uint32_t place = places[k], next = from[place];
+        from[place] = place;
+        if (next % CUT_DISTANCE > 0) {
+            memcpy(flat_array_at(array, place), flat_array_at(array, next), size);
+            places[k] = next;
+            const char *ahead = flat_array_at(array, from[next]);
+            for (size_t i = 0; i < size; i += CACHE_LINE)
+                __builtin_prefetch(ahead + i, 1);
+            __builtin_prefetch(&from[from[next]], 1);
+        } else {
+            memcpy(flat_array_at(array, place), saved_at(permutation, next / CUT_DISTANCE), size);
+            places[k] = start < end ? (uint32_t)(start++ * CUT_DISTANCE) : places[--count];
+        }
+    }
+}
+
+// Moves the structs of a cycle without a cut. `saved` has room for one.
+static void cycle_move(const Permutation *permutation, uint32_t first, void *saved)
+{
+    const FlatArray *array = permutation->array;
+    uint32_t *from = permutation->from, place = first, next;
+    memcpy(saved, flat_array_at(array, first), array->layout.size);
+    for (;;) {
+        next = from[place];
+        from[place] = place;
+        if (next == first) break;
+        memcpy(flat_array_at(array, place), flat_array_at(array, next), array->layout.size);
+        place = next;
+    }
+    memcpy(flat_array_at(array, place), saved, array->layout.size);
 }
 
 // Moves the struct at from[i] to i for every i. Destroys `from`.
@@ -186,12 +202,8 @@ static void array_permute(FlatArray *array, uint32_t *from)
     permutation.saved = memory_allocate(cut_count + 1, array->layout.size);
     parallel_run(cut_count, FLAT_RANGE_MIN / CUT_DISTANCE, range_save_cuts, &permutation);
     parallel_run(cut_count, FLAT_RANGE_MIN / CUT_DISTANCE, range_move_paths, &permutation);
-    void *saved_first = saved_at(&permutation, cut_count);
-    for (uint32_t i = 0; i < array->count; i++) { // cycles without a cut
-        if (from[i] == i) continue;
-        memcpy(saved_first, flat_array_at(array, i), array->layout.size);
-        path_move(&permutation, i, saved_first);
-    }
+    for (uint32_t i = 0; i < array->count; i++)
+        if (from[i] != i) cycle_move(&permutation, i, saved_at(&permutation, cut_count));
     free(permutation.saved);
 }
 
