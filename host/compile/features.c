@@ -1,8 +1,11 @@
 #include "host/compile/features.h"
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
+#include "host/compile/compiled_scene.h"
 #include "host/compile/shapes.h"
 #include "host/scene/mesh.h"
+#include <stdatomic.h>
 #include <stdlib.h>
 
 #define FEATURE_NAME(name, ...) #name,
@@ -45,37 +48,76 @@ static FeatureSet material_features(const Material *material)
     return set;
 }
 
-FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
+typedef struct {
+    const Scene *scene;
+    const FeatureSet *of_materials;
+    _Atomic FeatureSet set;
+} ObjectFeatures;
+
+static void range_find_materials(void *context, size_t begin, size_t end)
 {
-    bool *is_used = memory_allocate_zeroed(scene->materials.count, sizeof *is_used),
-         *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
-    for (size_t i = 0; i < scene->objects.count; i++) {
+    ObjectFeatures *features = context;
+    FeatureSet set = 0;
+    for (size_t i = begin; i < end; i++)
+        set |= features->of_materials[features->scene->objects.items[i].material];
+    atomic_fetch_or(&features->set, set);
+}
+
+static void range_find_features(void *context, size_t begin, size_t end)
+{
+    ObjectFeatures *features = context;
+    FeatureSet set = 0;
+    for (size_t i = begin; i < end; i++) {
+        const Object *object = &features->scene->objects.items[i];
+        set |= features->of_materials[object->material];
+        set |= shape_features[shape_primitive_type(object->type)];
+        if (object->type == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
+        if (object_is_smooth(features->scene, object)) set |= FEATURE_SMOOTH_NORMALS;
+    }
+    atomic_fetch_or(&features->set, set);
+}
+
+// Returns the union of the features of the materials of all triangles.
+static FeatureSet meshes_materials(const ObjectFeatures *features)
+{
+    const Scene *scene = features->scene;
+    FeatureSet set = 0;
+    bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
+    for (size_t i = 0; scene->meshes.count > 0 && i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        is_used[object->material] = true;
         if (object->type != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         const uint32_t *materials = mesh_materials(mesh, object);
         is_done[object->as.mesh.index] = materials != NULL;
         for (size_t k = 0; materials && k < mesh->triangle_count; k++)
-            is_used[materials[k]] = true;
+            set |= features->of_materials[materials[k]];
     }
-    FeatureSet set = 0;
-    for (size_t i = 0; i < scene->materials.count; i++)
-        if (is_used[i]) set |= of(&scene->materials.items[i]);
-    free(is_used);
     free(is_done);
     return set;
 }
 
+// Returns the union of what `of` returns for the used materials and of what `find` adds for objects.
+static FeatureSet objects_union(const Scene *scene, FeatureSet (*of)(const Material *material),
+                                void (*find)(void *features, size_t begin, size_t end))
+{
+    FeatureSet *of_materials = memory_allocate(scene->materials.count, sizeof *of_materials);
+    for (size_t i = 0; i < scene->materials.count; i++)
+        of_materials[i] = of(&scene->materials.items[i]);
+    ObjectFeatures features = {scene, of_materials, 0};
+    parallel_run(scene->objects.count, FLAT_RANGE_MIN, find, &features);
+    const FeatureSet set = features.set | meshes_materials(&features);
+    free(of_materials);
+    return set;
+}
+
+FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
+{
+    return objects_union(scene, of, range_find_materials);
+}
+
 FeatureSet features_of(const Scene *scene)
 {
-    FeatureSet set = materials_union(scene, material_features);
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        set |= shape_features[shape_primitive_type(object->type)];
-        if (object->type == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
-        if (object_is_smooth(scene, object)) set |= FEATURE_SMOOTH_NORMALS;
-    }
+    FeatureSet set = objects_union(scene, material_features, range_find_features);
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         set |= light_features[light->type];

@@ -7,6 +7,7 @@
 #include "host/compile/stages.h"
 #include "host/scene/oval.h"
 #include <float.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
@@ -128,18 +129,34 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
     return true;
 }
 
-// Returns the largest ratio of lengths of an oval's mapped rays (shapes/oval.h).
-static double stretch_largest(const Scene *scene)
+typedef struct {
+    const Scene *scene;
+    pthread_mutex_t lock;
+    double largest;
+} Stretch;
+
+static void range_stretch(void *context, size_t begin, size_t end)
 {
+    Stretch *stretch = context;
     double largest = 1;
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
+    for (size_t i = begin; i < end; i++) {
+        const Object *object = &stretch->scene->objects.items[i];
         double least, most;
         if (object->type != SHAPE_OVAL) continue;
         oval_stretches(object, &least, &most);
         largest = fmax(largest, most / least);
     }
-    return largest;
+    pthread_mutex_lock(&stretch->lock);
+    stretch->largest = fmax(stretch->largest, largest);
+    pthread_mutex_unlock(&stretch->lock);
+}
+
+// Returns the largest ratio of lengths of an oval's mapped rays (shapes/oval.h).
+static double stretch_largest(const Scene *scene)
+{
+    Stretch stretch = {scene, PTHREAD_MUTEX_INITIALIZER, 1};
+    parallel_run(scene->objects.count, FLAT_RANGE_MIN, range_stretch, &stretch);
+    return stretch.largest;
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
