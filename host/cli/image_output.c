@@ -2,6 +2,7 @@
 
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/band_values.h"
@@ -10,6 +11,22 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+
+// The bands that are copied. With one, the renderer would wait for each band to be encoded.
+enum { COPIES = 2 };
+
+// A copy of a band, which a thread writes once the bands before it are written. Until the thread is joined,
+// all members but the last two belong to it.
+typedef struct {
+    ImageOutput *output;
+    MessageList *messages;
+    Film band;
+    BandScratch layers[LAYER_COUNT]; // the memory of the band's layers
+    size_t number;                   // counts the bands
+    bool failed;                     // whether this band or an earlier one could not be written
+    pthread_t thread;
+    bool has_thread;
+} BandCopy;
 
 struct ImageOutput {
     const ImageOutputOptions *options;
@@ -20,14 +37,15 @@ struct ImageOutput {
     BandValues values;
     double bytes; // the size of all files before compression
 
-    // A separate thread writes a band while the next is rendered. Until that thread has ended, all members
-    // from here on belong to it, and so do the writers and messages.
-    pthread_t thread;
-    bool writing, failed;
-    MessageList *messages;
-    Film band;
-    BandScratch layers[LAYER_COUNT]; // the memory of the band's layers
+    // Separate threads write the bands, in turn. The writers, `values`, `failed` and `seconds` belong to the
+    // thread whose turn it is, or to the caller when all are joined.
+    BandCopy copies[COPIES];
+    size_t band_count; // whose threads were started
+    bool failed;
     double seconds;
+    pthread_mutex_t mutex; // of written_count
+    pthread_cond_t changed;
+    size_t written_count; // bands
 
     RerenderCounts rerenders; // the sum over all bands so far
     // All bands, if the file records their counts before their pixels.
@@ -42,6 +60,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOri
                                                                             : image_format_of(options->path),
                             .origin = *origin,
                             .values.eye = origin->scene->camera.position};
+    if (pthread_mutex_init(&output->mutex, NULL) != 0 || pthread_cond_init(&output->changed, NULL) != 0)
+        fault("out of memory: mutex");
     return output;
 }
 
@@ -148,11 +168,9 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     return opened;
 }
 
-static bool band_write(ImageOutput *output)
+static bool band_write(ImageOutput *output, const Film *band, MessageList *messages)
 {
-    const Film *band = &output->band;
     BandValues *values = &output->values;
-    MessageList *messages = output->messages;
     const bool is_npy = output->format == IMAGE_NPY;
     const void *arrays[LAYER_COUNT + 2];
     size_t count = 0;
@@ -173,30 +191,49 @@ static bool band_write(ImageOutput *output)
 
 static void *band_thread(void *argument)
 {
-    ImageOutput *output = argument;
-    double start = clock_seconds();
-    if (!band_write(output)) output->failed = true;
+    BandCopy *copy = argument;
+    ImageOutput *output = copy->output;
+    pthread_mutex_lock(&output->mutex);
+    while (output->written_count != copy->number)
+        pthread_cond_wait(&output->changed, &output->mutex);
+    pthread_mutex_unlock(&output->mutex);
+    const double start = clock_seconds();
+    if (!output->failed) output->failed = !band_write(output, &copy->band, copy->messages);
+    copy->failed = output->failed;
     output->seconds += clock_seconds() - start;
+    pthread_mutex_lock(&output->mutex);
+    output->written_count++;
+    pthread_cond_broadcast(&output->changed);
+    pthread_mutex_unlock(&output->mutex);
     return NULL;
 }
 
-// Waits for the thread. Returns false if a band could not be written.
-static bool band_written(ImageOutput *output)
+// Waits for the copy's thread. Returns false if this band or an earlier one could not be written.
+static bool copy_written(BandCopy *copy)
 {
-    if (output->writing) pthread_join(output->thread, NULL);
-    output->writing = false;
-    return !output->failed;
+    if (copy->has_thread) pthread_join(copy->thread, NULL);
+    copy->has_thread = false;
+    return !copy->failed;
+}
+
+// Waits for all threads. Returns false if a band could not be written.
+static bool bands_written(ImageOutput *output)
+{
+    bool written = true;
+    for (size_t i = 0; i < COPIES; i++)
+        written = copy_written(&output->copies[i]) && written;
+    return written;
 }
 
 // Copies the band, because the renderer reuses its memory for the next band.
-static void band_keep(ImageOutput *output, const Film *band)
+static void band_keep(BandCopy *copy, const Film *band)
 {
-    output->band = *band;
+    copy->band = *band;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (!band->layers[layer]) continue;
         size_t size = film_layer_size(band, layer);
-        output->band.layers[layer] =
-            memcpy(band_scratch_reserve(&output->layers[layer], size), band->layers[layer], size);
+        copy->band.layers[layer] =
+            memcpy(band_scratch_reserve(&copy->layers[layer], size), band->layers[layer], size);
     }
 }
 
@@ -209,14 +246,17 @@ static bool band_output(ImageOutput *output, const Film *band, MessageList *mess
 {
     if (!output->opened && !files_open(output, band, messages)) return false;
     output->opened = true;
-    if (!band_written(output)) return false;
-    output->messages = messages;
-    band_keep(output, band);
-    output->writing =
-        !output->options->synchronous && pthread_create(&output->thread, NULL, band_thread, output) == 0;
-    if (output->writing) return true; // a failure is reported with the next band
-    band_thread(output);
-    return !output->failed;
+    BandCopy *copy = &output->copies[output->band_count % COPIES];
+    if (!copy_written(copy)) return false;
+    copy->output = output;
+    copy->messages = messages;
+    copy->number = output->band_count++;
+    band_keep(copy, band);
+    copy->has_thread =
+        !output->options->synchronous && pthread_create(&copy->thread, NULL, band_thread, copy) == 0;
+    if (copy->has_thread) return true; // a failure is reported with a later band
+    band_thread(copy);
+    return !copy->failed;
 }
 
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
@@ -256,8 +296,11 @@ static void image_output_free(ImageOutput *output)
         film_free(&output->kept.items[i]);
     free(output->kept.items);
     band_values_free(&output->values);
-    for (Layer i = 0; i < LAYER_COUNT; i++)
-        free(output->layers[i].items);
+    for (size_t i = 0; i < COPIES; i++)
+        for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+            free(output->copies[i].layers[layer].items);
+    pthread_cond_destroy(&output->changed);
+    pthread_mutex_destroy(&output->mutex);
     free(output);
 }
 
@@ -276,7 +319,7 @@ static void names_print(const ImageOutput *output)
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
     ImageWriter **writers = output->writers;
-    bool whole = kept_write(output, messages) && band_written(output) && late_notes_write(output, messages);
+    bool whole = kept_write(output, messages) && bands_written(output) && late_notes_write(output, messages);
     const double start = clock_seconds();
     for (size_t i = 0; i < COUNT_OF(output->writers) && whole; i++)
         whole = !writers[i] || image_writer_finish(writers[i], messages);
@@ -298,7 +341,7 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
 
 void image_output_abandon(ImageOutput *output)
 {
-    band_written(output);
+    bands_written(output);
     for (size_t i = 0; i < COUNT_OF(output->writers); i++)
         image_writer_abandon(output->writers[i]);
     image_output_free(output);
