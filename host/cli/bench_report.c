@@ -22,7 +22,7 @@ const ResultTable bench_table = {
                "Mrays/s=mrays_per_s", "cold build ms=build_ms.cold", "cached build ms=build_ms.cached",
                "mJ=energy.frame_mj", "over first=to_first"},
     .extras = {"clock", "drift=drift.verdict", "verdict=comparison.verdict", "new over old=comparison",
-               "reason"},
+               "kernel=kernel_hash", "reason"},
     .verdicts = {"comparison.verdict"},
     .failed = "slower",
     .times = "frame_samples_ms",

@@ -83,8 +83,7 @@ static void certified_append(Text *notes, const CertifyErrors *errors, const Cer
     if (uncertified->count == 0) return;
     text_appendf(notes,
                  "    %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
-                 "are within "
-                 "2^-49, %zu neither\n",
+                 "are within 2^-49, %zu neither\n",
                  uncertified->count, text_plural(uncertified->count), uncertified->examined,
                  uncertified->witnessed, uncertified->close,
                  uncertified->examined - uncertified->witnessed - uncertified->close);
