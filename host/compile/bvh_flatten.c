@@ -52,15 +52,12 @@ static void range_box(void *context, size_t begin, size_t end)
 static void bounded_add(Bounded *bounded, size_t type, size_t count, bool has_unbounded)
 {
     const size_t first = bounded->count;
-    bounded->count += count;
-    if (has_unbounded) {
-        bounded->count = first;
-        for (size_t i = first; i < first + count; i++) {
-            if (bounds_is_everywhere(&bounded->boxes[i])) continue;
-            bounded->boxes[bounded->count] = bounded->boxes[i];
-            bounded->types[bounded->count] = bounded->types[i];
-            bounded->places[bounded->count++] = bounded->places[i];
-        }
+    if (!has_unbounded) bounded->count += count;
+    for (size_t i = first; has_unbounded && i < first + count; i++) {
+        if (bounds_is_everywhere(&bounded->boxes[i])) continue;
+        bounded->boxes[bounded->count] = bounded->boxes[i];
+        bounded->types[bounded->count] = bounded->types[i];
+        bounded->places[bounded->count++] = bounded->places[i];
     }
     bounded->type_counts[type] = (uint32_t)(bounded->count - first);
 }
