@@ -33,12 +33,12 @@ static uint64_t primitives_hash(const CompiledScene *compiled)
 }
 
 // Runs the stages on a scene in the device's unit.
-static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                       MessageList *messages)
+static bool stages_run(CompiledScene *compiled, const Scene *scene, const SceneExtent *extent,
+                       const CompileSettings *settings, MessageList *messages)
 {
     compiled->instances = instances_plan(scene, settings);
     if (!size_fits(compiled, scene, messages) || !features_fit(scene, settings, messages) ||
-        !lights_fit(compiled, scene, settings, messages))
+        !lights_fit(compiled, scene, extent, settings, messages))
         return false;
     textures_flatten(compiled, scene, settings);
     const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
@@ -74,7 +74,7 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
     *compiled = (CompiledScene){.unit = scene_unit(scene, &extent, settings)};
     Scene scaled = {0};
     if (compiled->unit != 1) scaled = scene_scaled(scene, 1 / compiled->unit);
-    bool done = stages_run(compiled, compiled->unit != 1 ? &scaled : scene, settings, messages);
+    bool done = stages_run(compiled, compiled->unit != 1 ? &scaled : scene, &extent, settings, messages);
     scene_scaled_free(&scaled);
     if (!done) compiled_scene_free(compiled);
     compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;
@@ -132,7 +132,7 @@ bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettin
         return true;
     }
     compiled->bvh_seconds = 0;
-    if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages))
+    if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, &extent, settings, messages))
         return false;
     shared_meshes_toggle(compiled);
     const bool is_near = eye_shift(compiled, scene, settings);

@@ -82,8 +82,9 @@ static FeatureSet meshes_materials(const ObjectFeatures *features)
 {
     const Scene *scene = features->scene;
     FeatureSet set = 0;
+    if (scene->meshes.count == 0) return set;
     bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
-    for (size_t i = 0; scene->meshes.count > 0 && i < scene->objects.count; i++) {
+    for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object->type != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];

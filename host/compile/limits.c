@@ -5,9 +5,7 @@
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
-#include "host/scene/oval.h"
 #include <float.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
@@ -23,9 +21,10 @@ bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *m
     if (single > largest)
         return message_error(messages, "the scene has %zu objects and triangles, more than %zu", single,
                              largest);
+    if (scene->meshes.count == 0) return true;
     size_t unshared = 0;
     uint32_t *uses = instance_uses(scene);
-    for (size_t i = 0; scene->meshes.count > 0 && i < scene->objects.count; i++) {
+    for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object_is_instance(object) && uses[object->as.mesh.index] > 1 && instance_mesh(compiled, i) == 0)
             unshared += object_primitive_count(scene, object);
@@ -129,40 +128,10 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
     return true;
 }
 
-typedef struct {
-    const Scene *scene;
-    pthread_mutex_t lock;
-    double largest;
-} Stretch;
-
-static void range_stretch(void *context, size_t begin, size_t end)
+bool lights_fit(const CompiledScene *compiled, const Scene *scene, const SceneExtent *extent,
+                const CompileSettings *settings, MessageList *messages)
 {
-    Stretch *stretch = context;
-    double largest = 1;
-    for (size_t i = begin; i < end; i++) {
-        const Object *object = &stretch->scene->objects.items[i];
-        double least, most;
-        if (object->type != SHAPE_OVAL) continue;
-        oval_stretches(object, &least, &most);
-        largest = fmax(largest, most / least);
-    }
-    pthread_mutex_lock(&stretch->lock);
-    stretch->largest = fmax(stretch->largest, largest);
-    pthread_mutex_unlock(&stretch->lock);
-}
-
-// Returns the largest ratio of lengths of an oval's mapped rays (shapes/oval.h).
-static double stretch_largest(const Scene *scene)
-{
-    Stretch stretch = {scene, PTHREAD_MUTEX_INITIALIZER, 1};
-    parallel_run(scene->objects.count, FLAT_RANGE_MIN, range_stretch, &stretch);
-    return stretch.largest;
-}
-
-bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                MessageList *messages)
-{
-    const double farthest = 1e18 * fmin(1, 4 / stretch_largest(scene));
+    const double farthest = 1e18 * fmin(1, 4 / extent->largest_stretch);
     Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
     if (settings->precision == PRECISION_DOUBLE) return true;
     for (size_t i = 0; i < scene->lights.count; i++) {

@@ -1,11 +1,10 @@
 #include "host/compile/scene_bounds.h"
 
-#include "host/base/memory.h"
 #include "host/base/parallel.h"
+#include "host/compile/compiled_scene.h"
 #include "host/compile/shapes.h"
-#include <stdlib.h>
-
-enum { BLOCK_SIZE = 4096 };
+#include "host/scene/oval.h"
+#include <pthread.h>
 
 double box_width(const Bounds *bounds)
 {
@@ -16,45 +15,48 @@ double box_width(const Bounds *bounds)
 
 static SceneExtent extent_empty(void)
 {
-    return (SceneExtent){bounds_empty(), 0, INFINITY};
+    return (SceneExtent){bounds_empty(), 0, INFINITY, 1};
 }
 
 typedef struct {
     const Scene *scene;
-    SceneExtent *extents; // of blocks of objects
-} BlockExtents;
+    pthread_mutex_t lock; // of `extent`
+    SceneExtent extent;
+} Measuring;
 
-static void blocks_bound(void *context, size_t begin, size_t end)
+static void range_measure(void *context, size_t begin, size_t end)
 {
-    const BlockExtents *blocks = context;
-    const Scene *scene = blocks->scene;
-    for (size_t block = begin; block < end; block++) {
-        SceneExtent extent = extent_empty();
-        for (size_t i = block * BLOCK_SIZE; i < scene->objects.count && i < (block + 1) * BLOCK_SIZE; i++) {
-            const Bounds bounds = object_bounds(scene, &scene->objects.items[i]);
-            if (bounds_is_everywhere(&bounds)) {
-                extent.unbounded_count++;
-                continue;
-            }
-            extent.bounds = bounds_join(extent.bounds, bounds);
-            const double width = box_width(&bounds);
-            if (width > 0 && width < extent.least_width) extent.least_width = width;
+    Measuring *measuring = context;
+    const Scene *scene = measuring->scene;
+    SceneExtent extent = extent_empty();
+    for (size_t i = begin; i < end; i++) {
+        const Object *object = &scene->objects.items[i];
+        const Bounds bounds = object_bounds(scene, object);
+        if (object->type == SHAPE_OVAL) {
+            double least, most;
+            oval_stretches(object, &least, &most);
+            extent.largest_stretch = fmax(extent.largest_stretch, most / least);
         }
-        blocks->extents[block] = extent;
+        if (bounds_is_everywhere(&bounds)) {
+            extent.unbounded_count++;
+            continue;
+        }
+        extent.bounds = bounds_join(extent.bounds, bounds);
+        const double width = box_width(&bounds);
+        if (width > 0 && width < extent.least_width) extent.least_width = width;
     }
+    pthread_mutex_lock(&measuring->lock);
+    SceneExtent *all = &measuring->extent;
+    all->bounds = bounds_join(all->bounds, extent.bounds);
+    all->unbounded_count += extent.unbounded_count;
+    all->largest_stretch = fmax(all->largest_stretch, extent.largest_stretch);
+    all->least_width = fmin(all->least_width, extent.least_width);
+    pthread_mutex_unlock(&measuring->lock);
 }
 
 SceneExtent scene_extent(const Scene *scene)
 {
-    const size_t block_count = scene->objects.count / BLOCK_SIZE + 1;
-    BlockExtents blocks = {scene, memory_allocate(block_count, sizeof *blocks.extents)};
-    parallel_run(block_count, 2, blocks_bound, &blocks);
-    SceneExtent all = extent_empty();
-    for (size_t i = 0; i < block_count; i++) {
-        all.bounds = bounds_join(all.bounds, blocks.extents[i].bounds);
-        all.unbounded_count += blocks.extents[i].unbounded_count;
-        all.least_width = fmin(all.least_width, blocks.extents[i].least_width);
-    }
-    free(blocks.extents);
-    return all;
+    Measuring measuring = {scene, PTHREAD_MUTEX_INITIALIZER, extent_empty()};
+    parallel_run(scene->objects.count, FLAT_RANGE_MIN, range_measure, &measuring);
+    return measuring.extent;
 }

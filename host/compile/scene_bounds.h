@@ -8,8 +8,11 @@ typedef struct {
     Bounds bounds;          // of all bounded objects
     size_t unbounded_count; // of the others
     double least_width;     // of all boxes whose width is not 0, infinite if there are none
+    double
+        largest_stretch; // the largest ratio of lengths of an oval's mapped rays (shapes/oval.h), at least 1
 } SceneExtent;
 
+// Measures the boxes of all objects.
 SceneExtent scene_extent(const Scene *scene);
 
 // Returns the second largest side of a box, or the largest if the others are 0: the size of what has a length

@@ -21,8 +21,8 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
 
 // limits.c: Returns false with a message if the square of a light's distance overflows the precision. The
 // scene is in the device's unit.
-bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                MessageList *messages);
+bool lights_fit(const CompiledScene *compiled, const Scene *scene, const SceneExtent *extent,
+                const CompileSettings *settings, MessageList *messages);
 
 // textures.c: Makes the scene's images linear (display values are sRGB; a scene of display colors keeps all
 // values) and halves them level by level. Fills FLAT_TEXTURE_LEVELS, FLAT_TEXELS and `textures`.
