@@ -5,7 +5,6 @@
 #include "host/base/memory.h"
 #include "host/base/message.h"
 #include "host/base/text.h"
-#include "tests/owned.h"
 
 #include <float.h>
 #include <math.h>

@@ -7,7 +7,6 @@
 #include "host/base/stage.h"
 #include "tests/check.h"
 #include "tests/child.h"
-#include "tests/owned.h"
 
 static char *printed(const MessageList *messages)
 {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
 
 // Return memory, never NULL. memory_allocate_zeroed clears it. `count * size` is checked for overflow.
 void *memory_allocate(size_t count, size_t size);
@@ -22,3 +24,25 @@ enum { MEMORY_LARGE_MIN = 1 << 22 };
 // translations of random reads. A page takes memory once it is written. free() releases it. Ends the program
 // by a fault when memory runs out or the product overflows.
 void *memory_allocate_large(size_t count, size_t size);
+
+// Frees the memory to which a variable points. For OWNED.
+static inline void memory_free_owned(void *variable)
+{
+    void *memory;
+    memcpy(&memory, variable, sizeof memory);
+    free(memory);
+}
+
+// Declares a pointer whose memory is freed where its scope ends, as in `OWNED char *path =
+// text_format(...);`. It must be initialized. The headers of other types that own memory define OwnedText,
+// OwnedImage and so on in the same way.
+#define OWNED __attribute__((cleanup(memory_free_owned)))
+
+// Returns the pointer of an OWNED variable, which is NULL afterwards, so that the caller owns the memory.
+static inline void *memory_release(void *variable)
+{
+    void *memory;
+    memcpy(&memory, variable, sizeof memory);
+    memset(variable, 0, sizeof memory);
+    return memory;
+}

@@ -55,6 +55,7 @@ void message_list_print(const MessageList *list, FILE *stream);
 char *message_list_text(const MessageList *list);
 void message_free(Message *message);
 void message_list_free(MessageList *list);
+#define OwnedMessageList __attribute__((cleanup(message_list_free))) MessageList
 // Removes each message that is in `known`, with the same severity and place and a text that differs at most
 // in numbers that are not whole.
 void message_list_remove(MessageList *list, const MessageList *known);

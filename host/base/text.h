@@ -33,6 +33,7 @@ char *text_format_list(const char *format, va_list arguments) __attribute__((for
 locale_t text_locale(void);
 const char *text_c(const Text *text); // never NULL
 void text_free(Text *text);           // frees and zeroes
+#define OwnedText __attribute__((cleanup(text_free))) Text
 
 // A short text that is returned by value.
 typedef struct {

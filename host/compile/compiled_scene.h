@@ -55,6 +55,7 @@ typedef struct {
 } CompiledScene;
 
 void compiled_scene_free(CompiledScene *compiled); // and zeroes
+#define OwnedCompiledScene __attribute__((cleanup(compiled_scene_free))) CompiledScene
 
 // Returns the number of primitives in the BVH.
 static inline uint32_t bvh_primitive_count(const CompiledScene *compiled)

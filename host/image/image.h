@@ -108,3 +108,4 @@ bool image_is_known(const char *path);
 bool image_bytes_are_known(const void *bytes, size_t length);
 double image_value(const Image *image, size_t i); // values[i] at the precision of the file
 void image_free(Image *image);
+#define OwnedImage __attribute__((cleanup(image_free))) Image

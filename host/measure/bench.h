@@ -32,6 +32,7 @@ typedef struct {
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch);
 void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds);
 void bench_times_free(BenchTimes *times);
+#define OwnedBenchTimes __attribute__((cleanup(bench_times_free))) BenchTimes
 
 // Returns the summary of the runs' launch times, by the host's clock if the events have a fault.
 Summary bench_kernel(const BenchTimes *times);

@@ -116,6 +116,7 @@ Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsign
 Film film_copy(const Film *band);
 // Frees the layers and sets the film to zeros.
 void film_free(Film *film);
+#define OwnedFilm __attribute__((cleanup(film_free))) Film
 
 // Copies the rows of a band into the film and adds the band's counts. Copies every layer that both have, with
 // reals converted to double.

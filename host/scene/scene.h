@@ -356,6 +356,7 @@ typedef struct {
 } Scene;
 
 void scene_free(Scene *scene); // frees and zeroes
+#define OwnedScene __attribute__((cleanup(scene_free))) Scene
 
 // Sets the position, and look_at along a unit direction, far enough that rounding keeps the direction.
 void camera_look_along(Camera *camera, Vector3 position, Vector3 direction);

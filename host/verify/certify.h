@@ -22,6 +22,7 @@ typedef struct {
 bool certify_sample_open(CertifySample *sample, const Scene *scene, const RenderSettings *settings,
                          size_t count);
 void certify_sample_close(CertifySample *sample);
+#define OwnedCertifySample __attribute__((cleanup(certify_sample_close))) CertifySample
 
 // `certified` makes this claim about each pixel that AOV_FLAG does not list as uncertified. Its object,
 // path and the lights that reach it are those of exact arithmetic on the scene's numbers and the camera's
