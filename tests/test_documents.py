@@ -210,8 +210,8 @@ def lanes_frame(lanes):
 NUMBER = r"([\d.,]*\d(?:e[-+]?\d+)?)"
 # Document, a pattern with a group for each number or name, and what these are by the measurements.
 CLAIMS = [  # N stands for a number
-    ("README.md", "glint renders a million triangles in N ms, Embree's packets in N ms. N spheres take N ms, with Embree N ms, or N ms with "
-                  "glint's sphere test",
+    ("README.md", "glint renders a million triangles in N ms, and Embree's packets take N ms. N spheres take N ms in glint and N ms in "
+                  "Embree, or N ms if Embree calls glint's sphere test",
      lambda: (frame("bunny-1000000"), frame("bunny-1000000", "Embree packets"), 16, frame("spheres-16"), frame("spheres-16", "Embree packets"),
               frame("spheres-16", "Embree packets, our spheres"))),
     ("README.md", "None of N pixels compared in N scenes",
