@@ -173,6 +173,27 @@ class View(TestCase):
         window.shows_at_last(self.image_of(SCENE.replace(background, changed)))
         window.close()
 
+    def test_reload_of_a_linked_file(self):
+        """A file is watched where symbolic links lead, and the camera is written there."""
+        for folder, name in ("scenes", "scene.yaml"), ("meshes", "mesh.obj"):
+            os.mkdir(folder)
+            shutil.move(name, folder)
+            os.symlink(f"{folder}/{name}", name)
+        os.symlink("../mesh.obj", "scenes/mesh.obj")
+        window = Window(self, options="--write-camera")
+        window.shows_at_last(self.image_of(SCENE))
+        changed = SCENE.replace("0.9, 0.8, 0.7", "1, 0, 0")
+        write("scenes/scene.yaml", changed)
+        window.shows_at_last(self.image_of(changed))
+        write("meshes/mesh.obj", MESH.replace("1 1 0", "1.5 1 0"))
+        window.shows_at_last(self.image_of(changed))
+        window.key("Left")
+        camera = window.camera()
+        window.line("^camera written to scene.yaml")
+        self.assertEqual(numbers(read("scenes/scene.yaml"), "position"), numbers(camera, "position"))
+        self.assertTrue(Path("scene.yaml").is_symlink())
+        window.close()
+
     def test_mesh_of_a_mistaken_scene(self):
         """A mesh that only the mistaken scene names is watched."""
         window = Window(self)

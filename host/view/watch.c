@@ -19,7 +19,8 @@
 
 typedef struct {
     int folder; // its watch
-    char *path;
+    char *name; // in the folder
+    char *path; // reported
 } WatchedFile;
 
 struct Watch {
@@ -37,7 +38,7 @@ static void event_report(const Watch *watch, const struct inotify_event *event)
     if (event->mask & IN_Q_OVERFLOW) watch->changed(watch->context, NULL);
     for (size_t i = 0; i < watch->files.count && event->len > 0; i++) {
         const WatchedFile *file = &watch->files.items[i];
-        if (file->folder == event->wd && strcmp(file_base_name(file->path), event->name) == 0)
+        if (file->folder == event->wd && strcmp(file->name, event->name) == 0)
             watch->changed(watch->context, file->path);
     }
 }
@@ -69,8 +70,10 @@ static void *watch_run(void *context)
 
 static void files_forget(Watch *watch)
 {
-    for (size_t i = 0; i < watch->files.count; i++)
+    for (size_t i = 0; i < watch->files.count; i++) {
+        free(watch->files.items[i].name);
         free(watch->files.items[i].path);
+    }
     watch->files.count = 0;
 }
 
@@ -115,23 +118,30 @@ void watch_close(Watch *watch)
     watch_free(watch);
 }
 
+// Watches the file at a place, whose changes are reported as those of the path.
+static void place_add(Watch *watch, const char *place, const char *path)
+{
+    const char *slash = strrchr(place, '/');
+    OWNED char *folder = memory_copy_text(slash ? place : ".");
+    if (slash) folder[slash == place ? 1 : slash - place] = '\0';
+    // the same folder gets the same watch
+    const int descriptor =
+        inotify_add_watch(watch->notify, folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
+    if (descriptor >= 0) {
+        WatchedFile file = {descriptor, memory_copy_text(file_base_name(place)), memory_copy_text(path)};
+        array_push(watch->files, file);
+    } else if (errno != ENOENT && !watch->has_failed) { // the reader of a missing file reports it
+        failure_print(path, ", and perhaps to other files,", errno);
+        watch->has_failed = true;
+    }
+}
+
+// Watches the file and, if it is a symbolic link or in a folder that is one, what it leads to.
 static void file_add(Watch *watch, const char *path)
 {
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? memory_copy_text(path) : memory_copy_text(".");
-    if (slash) folder[slash == path ? 1 : slash - path] = '\0';
-    // the same folder gets the same watch
-    int descriptor = inotify_add_watch(watch->notify, folder, IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
-    const int error = errno;
-    free(folder);
-    if (descriptor < 0) {
-        // the reader of a missing file reports it
-        if (error != ENOENT && !watch->has_failed) failure_print(path, " and perhaps of others", error);
-        watch->has_failed |= error != ENOENT;
-        return;
-    }
-    WatchedFile file = {descriptor, memory_copy_text(path)};
-    array_push(watch->files, file);
+    OWNED char *target = realpath(path, NULL);
+    place_add(watch, path, path);
+    if (target && strcmp(target, path) != 0) place_add(watch, target, path);
 }
 
 void watch_add(Watch *watch, const char *path)

@@ -1,4 +1,5 @@
-// Reports when a watched file is written or replaced by another of its name, as many editors do.
+// Reports when a watched file, or the file to which a symbolic link leads, is written or replaced by another
+// of its name, as many editors do.
 #pragma once
 
 #include <stddef.h>
