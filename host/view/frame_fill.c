@@ -30,7 +30,8 @@ static char *summary_make(const FrameLoop *loop, uint32_t samples)
     double rays = (double)film_pixel_count(&loop->film) * samples;
     Text text = {0};
     text_appendf(&text, "%s\n", loop->options.device->name);
-    text_appendf(&text, "%s, %u lane%s, %ux%u, %u of %u sample%s, %.1f million camera rays/s\n",
+    text_appendf(&text,
+                 "%s, %u lane%s, %ux%u, %u of %u sample%s, %.1f million samples per second of launches\n",
                  precision_names[loop->settings.precision], report->lanes, text_plural(report->lanes),
                  loop->film.width, loop->film.height, samples, loop->settings.sample_count,
                  text_plural(loop->settings.sample_count), rays / launches / 1e6);
