@@ -206,6 +206,15 @@ class Parts(TestCase):
         with self.assertRaises(locate.Failure):
             locate.smallest([1, 2], lambda some: False)
 
+    def test_group_fit(self):
+        """A work-group is reduced as the launch reduced it (tests/test_opencl_compose.c)."""
+        for group, most, sides, expected in (([8, 8], 64, [64, 64, 64], [8, 8]), ([8, 8], 32, [64, 64, 64], [8, 4]), ([8, 8], 16, [4, 8, 64], [4, 4]),
+                                             ([8, 8], 64, [4, 8, 64], [4, 8]), ([8, 8], 1, [64, 64, 64], [1, 1]), ([16], 64, [4, 1, 1], [4])):
+            device, kernel = locate.Device.__new__(locate.Device), unittest.mock.Mock()
+            device.device = unittest.mock.Mock(max_work_item_sizes=sides, max_work_group_size=most)
+            kernel.get_work_group_info.return_value = 64
+            self.assertEqual(device.group_fit(kernel, group), expected)
+
     def test_exact(self):
         """Results are numpy's, which are the processor's, for all kinds of operands."""
         generator = np.random.default_rng(1)

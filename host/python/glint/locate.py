@@ -104,10 +104,13 @@ class Device:
         return data
 
     def group_fit(self, kernel, group):
-        """Returns the work-group reduced to what device and kernel allow, as in host/opencl/launch.c."""
-        group, sides = list(group), self.device.max_work_item_sizes
-        most = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device)
-        while int(np.prod(group)) > most or any(side > limit for side, limit in zip(group, sides)):
+        """Returns the work-group reduced to what device and kernel allow, as work_group_fit in host/opencl/launch.c does."""
+        group = list(group)
+        most = min(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device), self.device.max_work_group_size)
+        for i, limit in enumerate(self.device.max_work_item_sizes[:len(group)]):
+            while group[i] > limit:
+                group[i] //= 2
+        while np.prod(group) > most:
             longest = max(range(len(group)), key=lambda i: (group[i], i))
             group[longest] //= 2
         return group
