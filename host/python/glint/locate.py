@@ -27,7 +27,6 @@ from . import _instrument as instrument
 from ._exact import NAN, exact, number
 
 os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # as host/opencl/device.c does
-FILM, BAND = 5, 6  # arguments of the kernel `render`
 TRACE_WORDS = 1 << 22
 
 
@@ -66,10 +65,15 @@ class Launch:
         """Returns the text as parsed for a compiler that defines the macros."""
         return instrument.parse(instrument.preprocess(self.text, definitions))
 
+    def index(self, name):
+        """Returns the index of an argument of the kernel `render`."""
+        names = re.findall(r"\w+(?=,|$)", re.search(r"kernel void render\(SCENE_ARGUMENTS, (.*?)\)", self.text, re.S)[1])
+        return len(self.arguments) - len(names) + names.index(name)
+
     @property
     def band(self):
         """Returns x and y of the first pixel, the width and the height."""
-        return np.frombuffer(self.arguments[BAND][0], np.uint32)
+        return np.frombuffer(self.arguments[self.index("band_pixels")][0], np.uint32)
 
 
 class Device:
@@ -134,7 +138,7 @@ class Device:
             first = [begin + (at - begin) // side * side for begin, at, side in zip(launch.first, item, group)]
             items = group
         cl.enqueue_nd_range_kernel(self.queue, kernel, items, group, first).wait()
-        return self.read(buffers[FILM]), [self.read(value) for value in added if isinstance(value, cl.Buffer)]
+        return self.read(buffers[launch.index("film")]), [self.read(value) for value in added if isinstance(value, cl.Buffer)]
 
 
 class Pixel(NamedTuple):
