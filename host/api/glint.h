@@ -3,7 +3,9 @@
 // Functions that can fail return a GlintStatus. Functions with a `messages` parameter, which may be NULL, set
 // *messages to their warnings and errors, one or more lines each, or to NULL if there are none. The caller
 // frees it with glint_text_free. Messages about a scene begin with FILE:LINE:COLUMN. A device warns once if
-// its kernel cache cannot be used. Apart from an out-of-memory message, the library prints nothing.
+// its kernel cache cannot be used. If a kernel does not compile, its text stays in a file in TMPDIR, which
+// the message names. The library prints nothing, unless memory runs out or it finds a bug in itself. Then the
+// process prints a message to stderr and exits.
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
 // can add members. Members beyond the caller's size are read as 0. A member that this version of the library
@@ -13,8 +15,7 @@
 //
 // A scene does not depend on a device; a tracer needs its device. A device serves one call at a time, and
 // calls from other threads wait. Calls only read a scene, so several threads may use it at once. Listing
-// devices and opening one set the environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If
-// memory runs out, the process prints a message to stderr and exits.
+// devices and opening one set the environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 #ifndef GLINT_H
 #define GLINT_H
 

@@ -75,7 +75,7 @@ def pointer(array: Optional[np.ndarray]) -> Optional[int]:
 
 
 def uint32(name: str, value: int) -> int:
-    """Returns the value if it is an integer that fits 32 bits, to which ctypes would truncate it."""
+    """Returns the value. Raises ValueError unless it is an integer of 32 bits, because ctypes would truncate it silently."""
     try:
         value = operator.index(value)
     except TypeError:
