@@ -45,6 +45,7 @@ static void batch_close(Batch *batch)
     free(batch->ends);
     free(batch->hits.items);
 }
+#define OwnedBatch __attribute__((cleanup(batch_close))) Batch
 
 // Traces the batch's rays from hit to hit, up to `hits_max` each, and lists the hits. Returns false if the
 // device failed.
@@ -101,18 +102,17 @@ static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hi
                            MessageList *messages)
 {
     const size_t most = batch_rays(tracer, rays->count);
-    Batch batch = batch_open(most);
-    bool is_sound = true;
-    for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
+    OwnedBatch batch = batch_open(most);
+    for (size_t first = 0, count; first < rays->count; first += count) {
         count = rays->count - first < most ? rays->count - first : most;
         for (size_t i = 0; i < count; i++)
             batch.indices[i] = (uint32_t)i;
-        is_sound = rays_scale(batch.rays, batch.exponents, rays, first, count, tracer->precision, messages) &&
-                   batch_trace(&batch, tracer->renderer, count, hits_max);
-        if (is_sound) batch_append(&batch, first, count, all);
+        if (!rays_scale(batch.rays, batch.exponents, rays, first, count, tracer->precision, messages) ||
+            !batch_trace(&batch, tracer->renderer, count, hits_max))
+            return false;
+        batch_append(&batch, first, count, all);
     }
-    batch_close(&batch);
-    return is_sound;
+    return true;
 }
 
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,

@@ -1,6 +1,7 @@
 // Begins and ends the calls of glint.h.
 #include "host/api/handles.h"
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,9 +47,8 @@ GlintStatus call_end(MessageList *list, GlintDevice *device, GlintStatus status,
 {
     if (device) message_list_move(list, &device->warnings);
     if (device && !compute_ok(&device->compute)) {
-        char *failure = compute_failure_text(&device->compute);
+        OWNED char *failure = compute_failure_text(&device->compute);
         message_error(list, "%s", failure);
-        free(failure);
         status = GLINT_DEVICE_FAILED;
     }
     if (messages) *messages = message_list_text(list);

@@ -32,10 +32,9 @@ GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *
         info->size = stride;
         info_set(info, &devices.items[i]);
     }
-    char *failure = device_list_failure_text(&devices);
+    OWNED char *failure = device_list_failure_text(&devices);
     if (failure) message_error(&list, "%s", failure);
     const GlintStatus status = !is_sound ? GLINT_WRONG_INPUT : failure ? GLINT_DEVICE_FAILED : GLINT_DONE;
-    free(failure);
     device_list_close(&devices);
     return call_end(&list, NULL, status, messages);
 }
@@ -87,9 +86,8 @@ Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderS
     Compute *compute = &device->compute;
     if (settings->precision == PRECISION_CERTIFIED && !compute->device->fp64 && !compute->reference &&
         compute_ok(compute)) {
-        MessageList ignored = {0}; // renderer_open names what is missing
+        OwnedMessageList ignored = {0}; // renderer_open names what is missing
         const Device *reference = device_choose_reference(&device->list, NULL, &ignored);
-        message_list_free(&ignored);
         if (reference) compute_open_reference(compute, reference);
     }
     return renderer_open(compute, scene, settings, messages);

@@ -153,21 +153,18 @@ static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const Trac
                           MessageList *messages)
 {
     const size_t batch = batch_rays(tracer, rays->count);
-    TraceRay *scaled = memory_allocate(batch, sizeof *scaled);
-    TraceHit *found = memory_allocate(batch, sizeof *found);
-    int *exponents = memory_allocate(batch, sizeof *exponents);
-    bool is_sound = true;
-    for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
+    OWNED TraceRay *scaled = memory_allocate(batch, sizeof *scaled);
+    OWNED TraceHit *found = memory_allocate(batch, sizeof *found);
+    OWNED int *exponents = memory_allocate(batch, sizeof *exponents);
+    for (size_t first = 0, count; first < rays->count; first += count) {
         count = rays->count - first < batch ? rays->count - first : batch;
-        is_sound = rays_scale(scaled, exponents, rays, first, count, tracer->precision, messages) &&
-                   renderer_trace_closest(tracer->renderer, scaled, count, found);
+        if (!rays_scale(scaled, exponents, rays, first, count, tracer->precision, messages) ||
+            !renderer_trace_closest(tracer->renderer, scaled, count, found))
+            return false;
         HitBatch hits = {arrays, first, found, exponents};
-        if (is_sound) parallel_run(count, RAYS_PER_THREAD_MIN, hit_batch_write, &hits);
+        parallel_run(count, RAYS_PER_THREAD_MIN, hit_batch_write, &hits);
     }
-    free(exponents);
-    free(found);
-    free(scaled);
-    return is_sound;
+    return true;
 }
 
 bool rays_read(GlintRays *read, const GlintRays *given, MessageList *messages)

@@ -4,7 +4,6 @@
 #include "host/base/memory.h"
 #include "host/import/yaml/yaml.h"
 #include "host/view/camera_yaml.h"
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -32,7 +31,7 @@ static void animated_camera_read(CameraFile *file, uint32_t frame)
     YamlReader *reader = &file->reader;
     YamlTree *tree = &reader->tree;
     const size_t count = tree->nodes.count;
-    YamlNode *nodes = memory_allocate(count, sizeof *nodes);
+    OWNED YamlNode *nodes = memory_allocate(count, sizeof *nodes);
     memcpy(nodes, tree->nodes.items, count * sizeof *nodes);
     const YamlNode *turn = field_node(reader, file->camera, "turn");
     const bool can_turn = turn != file->camera && !is_zero(reader, turn);
@@ -46,7 +45,6 @@ static void animated_camera_read(CameraFile *file, uint32_t frame)
     reader->options = NULL;
     memcpy(tree->nodes.items, nodes, count * sizeof *nodes);
     tree->nodes.count = count;
-    free(nodes);
     file->camera = field_node(reader, tree->nodes.items, "camera");
 }
 
@@ -169,10 +167,9 @@ static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, con
     snprintf(key, sizeof key, "%u", frame);
     if (!yaml_has_keys(reader, animated)) {
         const char *quote = quote_of(copy->source, name);
-        Text text = {0};
+        OwnedText text = {0};
         text_appendf(&text, "{%skeys%s: {%s%s%s: %s}}", quote, quote, quote, key, quote, text_c(value));
         value_replace(copy, name, animated, text_c(&text));
-        text_free(&text);
         return true;
     }
     const YamlNode *keys = field_node(reader, animated, "keys"), *old;
@@ -245,23 +242,20 @@ static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera, c
         if (key->offset < copy->next || value->offset < key->offset)
             return report_error(&reader->report, key->offset,
                                 "the camera cannot be written: it has an alias");
-        Text written = {0};
         if (lacks_up) {
-            vector_write_yaml(&written, camera->up);
-            pair_insert(copy, file->camera, key, "up", &written);
-            text_free(&written);
+            OwnedText up = {0};
+            vector_write_yaml(&up, camera->up);
+            pair_insert(copy, file->camera, key, "up", &up);
         }
         lacks_up = false;
+        OwnedText written = {0};
         const char *name = yaml_text(&reader->tree, key);
         const bool records = frame && gets_key(reader, name, value);
         if (!value_write(&written, name, old, camera, has_turn, records)) continue;
-        bool is_replaced = true;
-        if (records)
-            is_replaced = value_record(copy, file, key, value, *frame, &written);
-        else
+        if (!records)
             value_replace(copy, key, value, text_c(&written));
-        text_free(&written);
-        if (!is_replaced) return false;
+        else if (!value_record(copy, file, key, value, *frame, &written))
+            return false;
     }
     copy_until(copy, copy->source->length);
     return true;

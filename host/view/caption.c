@@ -44,11 +44,10 @@ static void font_size_set(Caption *caption, int size)
 
 Caption *caption_open(SDL_Renderer *target, float scale)
 {
-    char *path = font_path();
+    OWNED char *path = font_path();
     const int size = (int)(FONT_SIZE * scale);
     const bool has_library = path && TTF_Init() == 0;
     TTF_Font *font = has_library ? TTF_OpenFont(path, size) : NULL;
-    free(path);
     if (!font) {
         if (has_library) TTF_Quit();
         return NULL;

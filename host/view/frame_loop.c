@@ -7,9 +7,9 @@
 
 static void image_save(FrameLoop *loop)
 {
-    char *path = save_path_acquire(loop);
+    OWNED char *path = save_path_acquire(loop);
+    OWNED float *narrow = NULL;
     Film film = loop->film;
-    float *narrow = NULL;
     film.is_double = renderer_report(loop->renderer)->is_double;
     if (!film.is_double) {
         film.layers[LAYER_COLOR] = narrow = film_narrow_color(&film);
@@ -19,9 +19,7 @@ static void image_save(FrameLoop *loop)
     const CompleteImage image = {&loop->scene, &loop->settings, loop->renderer, &film};
     const bool saved = loop->options.save(loop->options.save_context, path, &image, &messages);
     messages_publish(loop, &messages);
-    free(narrow);
     if (saved) message_publish(loop, text_format("saved %s\n", path));
-    free(path);
 }
 
 // Does the work of a state and returns the next one.

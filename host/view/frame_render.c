@@ -160,13 +160,13 @@ bool rounds_render(FrameLoop *loop)
 
 typedef struct {
     FrameLoop *loop;
-    Film film;
+    Film *film;
 } Reference;
 
 static bool reference_receive(void *context, const Film *band)
 {
     Reference *reference = context;
-    film_copy_band(&reference->film, band);
+    film_copy_band(reference->film, band);
     rendering_show(reference->loop, band);
     return true;
 }
@@ -183,14 +183,12 @@ bool errors_render(FrameLoop *loop)
         moves ? renderer_move(loop->reference, &loop->scene, &settings, &messages) : loop->reference != NULL;
     messages_publish(loop, &messages);
     if (!prepared) return false;
-    Reference reference = {loop, film_allocate(settings.width, settings.height, loop->film.light_count, 0)};
-    const bool done = renderer_render(loop->reference, 0, reference_receive, &reference);
-    if (done) {
-        frame_fill(loop, 1);
-        loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &reference.film);
-        distances_fill(loop);
-        frame_publish(loop, 1);
-    }
-    film_free(&reference.film);
-    return done;
+    OwnedFilm film = film_allocate(settings.width, settings.height, loop->film.light_count, 0);
+    Reference reference = {loop, &film};
+    if (!renderer_render(loop->reference, 0, reference_receive, &reference)) return false;
+    frame_fill(loop, 1);
+    loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &film);
+    distances_fill(loop);
+    frame_publish(loop, 1);
+    return true;
 }

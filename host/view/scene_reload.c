@@ -31,9 +31,8 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     if (loop->renderer) {
         loop->expected_move = move_guess(loop->renderer);
     } else if (compute_ok(&loop->compute)) {
-        MessageList known = {0};
+        OwnedMessageList known = {0};
         loop->renderer = renderer_open(&loop->compute, &loop->scene, &loop->settings, &known);
-        message_list_free(&known);
         return false;
     } else {
         compute_close(&loop->compute); // the image, which is due, reopens it or reports why not
@@ -46,19 +45,16 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
 static Text camera_text_read(const FrameLoop *loop)
 {
     Text text = {0};
-    MessageList ignored = {0};
+    OwnedMessageList ignored = {0};
     const char *path = camera_path(&loop->options);
     if (loop->options.writes_camera && !file_obstacle(path)) text_read_file(&text, path, &ignored);
-    message_list_free(&ignored);
     return text;
 }
 
 bool is_own_write(FrameLoop *loop)
 {
-    Text text = camera_text_read(loop);
-    const bool is_own = written_matches(loop, &text);
-    text_free(&text);
-    return is_own;
+    OwnedText text = camera_text_read(loop);
+    return written_matches(loop, &text);
 }
 
 bool scene_reload(FrameLoop *loop)
@@ -97,24 +93,20 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
                              MessageList *messages)
 {
     const char *path = camera_path(&loop->options);
-    Text old = {0}, text = {0};
+    OwnedText old = {0}, text = {0};
     if (!text_read_file(&old, path, messages)) return false;
     const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};
     OutputFile output;
-    const bool is_open =
-        camera_replace(&text, &source, camera, frame, messages) && output_open(&output, path, messages);
-    bool done = is_open && output_write(&output, text.items, text.count, messages) &&
-                output_finish(&output, messages);
-    if (done) {
-        // before the change is visible, so that the loop recognizes it as the window's
-        Camera file_camera = *camera;
-        written_store(loop, &old, &text, &file_camera);
-        done = output_commit(&output, messages);
-        if (!done) written_restore(loop, &text, &file_camera);
-    } else if (is_open) {
+    if (!camera_replace(&text, &source, camera, frame, messages) || !output_open(&output, path, messages))
+        return false;
+    if (!output_write(&output, text.items, text.count, messages) || !output_finish(&output, messages)) {
         output_abandon(&output);
+        return false;
     }
-    text_free(&old);
-    text_free(&text);
-    return done;
+    // before the change is visible, so that the loop recognizes it as the window's
+    Camera file_camera = *camera;
+    written_store(loop, &old, &text, &file_camera);
+    if (output_commit(&output, messages)) return true;
+    written_restore(loop, &text, &file_camera);
+    return false;
 }

@@ -4,7 +4,6 @@
 #include "host/image/heatmap.h"
 #include "host/image/transfer.h"
 #include <math.h>
-#include <stdlib.h>
 
 #define VIEW_NAME(NAME, name, aovs) name,
 const char *const view_names[VIEW_COUNT] = {VIEW_LIST(VIEW_NAME)};
@@ -15,13 +14,12 @@ const unsigned view_aovs[VIEW_COUNT] = {VIEW_LIST(VIEW_AOVS)};
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer)
 {
     size_t row = 3 * (size_t)film->width;
-    float *values = memory_allocate(row, sizeof *values);
+    OWNED float *values = memory_allocate(row, sizeof *values);
     for (uint32_t y = 0; y < film->height; y++) {
         for (size_t i = 0; i < row; i++)
             values[i] = (float)(film->color[y * row + i] / sample_count);
         transfer_quantize(pixels + y * row, values, row, transfer, 8);
     }
-    free(values);
 }
 
 static uint8_t byte_of(double value)

@@ -10,7 +10,7 @@ static void title_set(const Window *window)
 {
     const uint32_t count =
         window->wanted.view == VIEW_COLOR ? window->options->frames.settings.sample_count : 1;
-    Text title = {0};
+    OwnedText title = {0};
     // only ASCII, because in the C locale SDL sets no other title
     text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->wanted.view],
                  precision_names[window->wanted.precision], window->wanted.size.width,
@@ -25,7 +25,6 @@ static void title_set(const Window *window)
         text_appendf(&title, ", %u %s", count, count == 1 ? "sample" : "samples");
     text_appendf(&title, " - glint (H: help)");
     SDL_SetWindowTitle(window->screen.window, text_c(&title));
-    text_free(&title);
 }
 
 void frame_show(Window *window)
@@ -59,37 +58,34 @@ void stage_show(Window *window)
 
 static void help_draw(const Window *window)
 {
-    Text help = {0};
+    OwnedText help = {0};
 #define HELP_LINE(input, effect) text_appendf(&help, "%s%-12s  %s", help.count ? "\n" : "", input, effect);
     VIEW_KEY_LIST(HELP_LINE)
 #undef HELP_LINE
     caption_draw(window->screen.caption, CAPTION_TOP, text_c(&help));
-    text_free(&help);
 }
 
 // Draws the times and what the pixel under the cursor sees.
 static void facts_draw(const Window *window)
 {
-    Text text = {0};
+    OwnedText text = {0};
     if (window->shows_times && window->frame.summary) text_appendf(&text, "%s", window->frame.summary);
     if (text.count > 0 && window->frame.largest_error >= 0)
         text_appendf(&text, "\nlargest error against double: %.3g", window->frame.largest_error);
     if (window->facts.are_shown && window->facts.text)
         text_appendf(&text, "%s%s", text.count > 0 ? "\n" : "", window->facts.text);
     caption_draw(window->screen.caption, CAPTION_TOP, text_c(&text));
-    text_free(&text);
 }
 
 // Draws the message and what keeps the next frame waiting.
 static void message_draw(const Window *window)
 {
-    Text text = {0};
+    OwnedText text = {0};
     if (window->message) text_appendf(&text, "%s", window->message);
     if (text.count > 0 && text.items[text.count - 1] != '\n') text_appendf(&text, "\n");
     text_appendf(&text, "%s", text_c(&window->stage));
     if (text.count > 0 && text.items[text.count - 1] == '\n') text.items[text.count - 1] = '\0';
     caption_draw(window->screen.caption, CAPTION_BOTTOM, text_c(&text));
-    text_free(&text);
 }
 
 void window_draw(Window *window)

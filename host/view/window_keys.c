@@ -20,7 +20,7 @@ static void arrow_turn(Window *window, double yaw, double pitch)
 // Writes the camera. With a `frame`, writes keys there.
 static void camera_write(Window *window, const uint32_t *frame)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     Text text = {0};
     if (frame_loop_write_camera(window->frames, &window->wanted.camera, frame, &messages)) {
         window->scene.camera = window->wanted.camera;
@@ -28,10 +28,8 @@ static void camera_write(Window *window, const uint32_t *frame)
         if (frame) text_appendf(&text, " at frame %u", *frame);
         text_appendf(&text, "\n");
     }
-    char *reasons = message_list_text(&messages);
+    OWNED char *reasons = message_list_text(&messages);
     if (reasons) text_appendf(&text, "%s", reasons);
-    free(reasons);
-    message_list_free(&messages);
     fputs(text_c(&text), stderr);
     message_show(window, text.items);
 }
@@ -74,17 +72,15 @@ static void save_ask(Window *window, const char *ending)
         message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
         return;
     }
-    char *stem = file_stem(window->options->frames.scene_path), *path = NULL;
+    OWNED char *stem = file_stem(window->options->frames.scene_path), *path = NULL;
     int number = 0;
     do {
         free(path);
         path = text_format("%s-%d.%s", stem, ++number, ending);
     } while (access(path, F_OK) == 0);
-    free(stem);
     window->play.is_running = false;
     request_send(window); // so that the newest request's image is saved
     frame_loop_save(window->frames, path);
-    free(path);
 }
 
 static void facts_toggle(Window *window)
