@@ -201,10 +201,10 @@ void frame_publish(FrameLoop *loop, uint32_t samples)
     loop->frame.samples = samples;
     stage_end(loop->stage);
     SharedState *shared = shared_lock(loop);
-    const Frame taken = shared->ready;
+    const Frame older = shared->ready;
     shared->ready = loop->frame;
     shared->has_ready = true;
-    loop->frame = taken;
+    loop->frame = older;
     atomic_store(&loop->first_is_due, false);
     shared_publish(loop);
 }

@@ -105,7 +105,8 @@ char *save_path_acquire(FrameLoop *loop);
 bool probe_acquire(FrameLoop *loop, uint32_t pixel[2]);
 // Takes ownership of the facts.
 void facts_publish(FrameLoop *loop, char *facts);
-// Takes ownership of the message. "" removes the last one; others are appended to those not yet taken.
+// Takes ownership of the message. "" removes the last one; others are appended to one that the window has not
+// acquired.
 void message_publish(FrameLoop *loop, char *message);
 // Takes ownership of the messages.
 void messages_publish(FrameLoop *loop, MessageList *messages);
