@@ -4,6 +4,7 @@
 #include "host/verify/random_shape.h"
 #include "tests/check.h"
 #include "tests/child.h"
+#include "tests/files.h"
 #include "tests/film.h"
 #include "tests/fuzz/readers.h"
 #include <glob.h>
@@ -42,61 +43,15 @@ static void edit_flip_bit(Text *text)
 
 static void edit_replace_by_word(Text *text)
 {
-    static const char *const words[] = {"nan",
-                                        "inf",
-                                        "-",
-                                        "1e999",
-                                        "1e-999",
-                                        "0x10",
-                                        "-1",
-                                        "0",
-                                        "1e30",
-                                        ",",
-                                        "[",
-                                        "]",
-                                        "{",
-                                        "}",
-                                        ":",
-                                        ": ",
-                                        "- ",
-                                        "&a",
-                                        "*a",
-                                        "!t",
-                                        "|",
-                                        ">",
-                                        "\"",
-                                        "'",
-                                        "\\",
-                                        "#",
-                                        "\n",
-                                        "\t",
-                                        "\r",
-                                        "---",
-                                        "? ",
-                                        "=>",
-                                        "<<",
-                                        "%",
-                                        "@",
-                                        "null",
-                                        "~",
-                                        "{}",
-                                        "[]",
-                                        "sp",
-                                        "cy",
-                                        "\xff",
-                                        "\xc3",
-                                        "C",
-                                        "pp 4",
-                                        "p 3",
-                                        "...",
-                                        "true",
-                                        ", ",
-                                        "?",
-                                        "\n\n ",
-                                        "\xef\xbb\xbf",
-                                        "\xe2\x80\xa8",
-                                        "<<: *a"};
-    const char *word = words[random_below(COUNT_OF(words))];
+    static const char *const words[][9] = {
+        {"nan", "inf", "-", "1e999", "1e-999", "0x10", "-1", "0", "1e30"},
+        {",", "[", "]", "{", "}", ":", ": ", "- ", "&a"},
+        {"*a", "!t", "|", ">", "\"", "'", "\\", "#", "\n"},
+        {"\t", "\r", "---", "? ", "=>", "<<", "%", "@", "null"},
+        {"~", "{}", "[]", "sp", "cy", "\xff", "\xc3", "C", "pp 4"},
+        {"p 3", "...", "true", ", ", "?", "\n\n ", "\xef\xbb\xbf", "\xe2\x80\xa8", "<<: *a"},
+    };
+    const char *word = words[random_below(COUNT_OF(words))][random_below(COUNT_OF(words[0]))];
     const size_t start = random_below(text->count + 1), rest = text->count - start, removed = random_below(4);
     text_replace(text, start, removed < rest ? removed : rest, word, strlen(word));
 }
@@ -152,43 +107,17 @@ static void text_damage(Text *text, const Seeds *seeds)
     }
 }
 
-// Appends each scene of a table (tests/broken), without its directives and messages.
-static void table_add(Seeds *seeds, const Text *table)
+// Appends the files that a pattern matches.
+static void files_add(Seeds *seeds, const char *pattern)
 {
-    const char *section = strstr(table->items, "#### scene ");
-    Text start = {0};
-    text_append(&start, table->items, (size_t)(section - table->items));
-    for (; section; section = strstr(section + 1, "#### scene ")) {
-        Text scene = {0};
-        const char *end = strstr(section, "#### expected");
-        for (const char *line = section, *next; line < end; line = next) {
-            next = strchr(line, '\n') + 1;
-            if (strncmp(line, "#### start\n", strlen("#### start\n")) == 0)
-                text_append(&scene, start.items, start.count);
-            else if (strncmp(line, "#### ", strlen("#### ")) != 0)
-                text_append(&scene, line, (size_t)(next - line));
-        }
-        if (scene.count > 0) array_push(*seeds, scene);
-    }
-    text_free(&start);
-}
-
-// Appends the files that a pattern for the reader's name matches.
-static void files_add(Seeds *seeds, const char *pattern, const char *reader)
-{
-    char *text = text_format(pattern, reader);
     glob_t paths;
-    if (glob(text, 0, NULL, &paths) == 0) {
-        for (size_t i = 0; i < paths.gl_pathc; i++) {
-            Text seed = {0};
-            MessageList messages = {0};
-            assert_true(text_read_file(&seed, paths.gl_pathv[i], &messages));
-            if (seed.count > LENGTH_MAX) seed.count = LENGTH_MAX;
-            array_push(*seeds, seed);
-        }
-        globfree(&paths);
+    if (glob(pattern, 0, NULL, &paths) != 0) return;
+    for (size_t i = 0; i < paths.gl_pathc; i++) {
+        Text seed = file_text(paths.gl_pathv[i]);
+        if (seed.count > LENGTH_MAX) seed.count = LENGTH_MAX;
+        array_push(*seeds, seed);
     }
-    free(text);
+    globfree(&paths);
 }
 
 static void seeds_free(Seeds *seeds)
@@ -199,8 +128,8 @@ static void seeds_free(Seeds *seeds)
 }
 
 typedef struct {
-    const char *reader;
-    size_t run_count, run; // the current one
+    const char *reader, *broken; // the folder of the scenes of tests/broken
+    size_t run_count, run;       // the current one
 } Feeding;
 
 // Feeds the reader. The inputs are the same in each run of the test.
@@ -209,12 +138,10 @@ static void reader_feed(void *context)
     Feeding *feeding = context;
     setenv("GLINT_FUZZ", feeding->reader, 1);
     LLVMFuzzerInitialize(NULL, NULL);
-    Seeds seeds = {0}, tables = {0};
-    files_add(&seeds, "tests/fuzz/corpus/%s/*", feeding->reader);
-    files_add(&seeds, "tests/scenes/*.%s", feeding->reader);
-    files_add(&tables, "tests/broken/%s.txt", feeding->reader);
-    for (size_t i = 0; i < tables.count; i++)
-        table_add(&seeds, &tables.items[i]);
+    Seeds seeds = {0};
+    files_add(&seeds, formatted("tests/fuzz/corpus/%s/*", feeding->reader));
+    files_add(&seeds, formatted("tests/scenes/*.%s", feeding->reader));
+    files_add(&seeds, formatted("%s/*.%s", feeding->broken, feeding->reader));
     assert_true(seeds.count > 0);
     random_state = (Random){1};
     for (feeding->run = 0; feeding->run < feeding->run_count; feeding->run++) {
@@ -226,7 +153,6 @@ static void reader_feed(void *context)
         LLVMFuzzerTestOneInput((const uint8_t *)text.items, text.count);
         text_free(&text);
     }
-    seeds_free(&tables);
     seeds_free(&seeds);
 }
 
@@ -235,13 +161,18 @@ TEST(readers_survive_damage)
     static const char *const readers[] = {
         "png",  "jpeg", "ppm", "exr", "npy", "obj",   "mtl",        "ply",   "stl",      "gltf",  "glb",
         "yaml", "rt",   "cfg", "nff", "dat", "reply", "checkpoint", "cache", "baseline", "golden"};
+    char *broken = folder_make();
+    const char *write_tables = formatted(
+        "for table in tests/broken/*.txt; do tests/scene_tables.py $table %s || exit; done", broken);
+    assert_int_equal(system(write_tables), 0);
     for (size_t i = 0; i < COUNT_OF(readers); i++) {
-        Feeding feeding = {readers[i], tests_are_long() ? 20000 : 1000, 0};
+        Feeding feeding = {readers[i], broken, tests_are_long() ? 20000 : 1000, 0};
         const ChildEnd end = child_run(reader_feed, &feeding, sizeof feeding);
         if (end.status != 0)
             fail_msg("reader %s, input %zu: exit status %d, signal %d: %s", readers[i], feeding.run,
                      end.status, end.signal, end.errors);
     }
+    folder_remove(broken);
 }
 
 TEST_MAIN(NULL, NULL)
