@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-r"""Reads tables of scenes: tests/broken/FORMAT.txt.
+r"""Reads tables of scenes: tests/broken/FORMAT.txt and tests/wild.txt.
 
 A section is a scene and the messages that it must get, each as `line:column: severity: text`:
 

@@ -1,10 +1,6 @@
-// Reads `.cfg` scenes. Tests every block's values, and the tolerances.
+// Reads `.cfg` scenes. Tests every block's values. test_wild.py has what is tolerated.
 #include "tests/check.h"
 #include "tests/scene_reading.h"
-
-#define CAMERA "=>camera :\n{\n\tposition 0 0 5\n\tlook_at 0 0 -1\n}\n"
-#define LIGHT  "=>light :\n{\n\tposition 0 9 0\n\tintensity 1 1 1\n}\n"
-#define SPHERE "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 0\n\tcolor 0 0 0\n\tdiffuse 1 1 1\n\tspecular 0\n}\n"
 
 static int set_up(void **state)
 {
@@ -56,25 +52,6 @@ TEST(materials)
     assert_number(sphere->shininess, 30);
     assert_vector(material_of(&objects[1])->color, 0, 0, 1);
     assert_number(material_of(&objects[2])->specular.largest, 0.25);
-}
-
-TEST(any_order_and_blanks)
-{
-    assert_messages(
-        "s.cfg", SPHERE "\r\n\n" LIGHT "=> camera:\r\n\n{\r\n\n  look_at 0 0 1\r\n\tposition 0\t0 0\r\n}\r\n",
-        "");
-}
-
-TEST(text_between_blocks_is_skipped)
-{
-    assert_messages("s.cfg", CAMERA "transfo 1 2 3\n" LIGHT SPHERE, "6:1: warning: skipped 'transfo'\n");
-}
-
-TEST(no_lights_no_objects)
-{
-    assert_messages("s.cfg", CAMERA,
-                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
-                    "light and emission are shown\n");
 }
 
 TEST_MAIN(set_up, complete_close)

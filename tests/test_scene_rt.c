@@ -1,11 +1,10 @@
-// Reads `.rt` scenes. Tests every element's values, and what is tolerated in files in the wild.
+// Reads `.rt` scenes. Tests every element's values. test_wild.py has more that is tolerated.
 #include "host/compile/scene_bounds.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #define CAMERA "C 0,0,-5 0,0,1 60\n"
 #define LIT    CAMERA "L 0,9,0 1\n"
-#define SPHERE "sp 0,0,0 2 255,0,0\n"
 
 static int set_up(void **state)
 {
@@ -80,13 +79,6 @@ TEST(square_on_the_floor)
     assert_vector(bounds.max, 1, 0, 1);
 }
 
-TEST(blanks_comments_and_line_ends)
-{
-    assert_messages(
-        "s.rt", "\xEF\xBB\xBF# top\r\n\r\n \tC\t0,0,0   0,0,1\t60 # end\r\nL 0,0,9 1#x\r\nsp 0,0,0 1 1,2,3",
-        "");
-}
-
 TEST(missing_parts_are_fine)
 {
     assert_messages("s.rt", CAMERA,
@@ -97,54 +89,10 @@ TEST(missing_parts_are_fine)
     assert_int_equal(scene.width, 0);
 }
 
-TEST(axes_are_made_unit)
-{
-    assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
-                    "3:10: warning: 'normal' is not a unit vector; normalized\n");
-    assert_messages("s.rt", LIT "pl 0,0,0 0.577,0.577,0.577 255,0,0\n", "");
-    OwnedScene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,0.5,0 1 4 255,0,0\n");
-    assert_vector(scene.objects.items[0].as.cylinder.from, 0, -2, 0);
-    assert_vector(scene.objects.items[0].as.cylinder.axis, 0, 4, 0);
-}
-
-TEST(zero_camera_direction)
-{
-    assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
-                    "1:12: warning: 'direction' is zero; the camera looks along +z\n");
-    OwnedScene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
-    assert_vector(scene.camera.look_at, 0, 0, 1);
-}
-
 TEST(far_camera_keeps_its_direction)
 {
     OwnedScene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
     assert_true(scene.camera.look_at.z > 0);
-}
-
-TEST(color_before_sizes)
-{
-    assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
-                    "3:16: warning: the color precedes the diameter and the height; accepted\n");
-    OwnedScene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
-    assert_number(scene.objects.items[0].as.cylinder.radius, 1);
-    assert_vector(scene.materials.items[0].color, 1, 0, 0);
-    assert_number(scene.materials.items[0].specular.largest, 0.5);
-}
-
-TEST(first_of_several_old_cameras)
-{
-    assert_messages("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\nL 0,9,0 1\n" SPHERE,
-                    "2:1: warning: only the first camera is used\n");
-    OwnedScene scene = scene_of_text("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\n");
-    assert_vector(scene.camera.position, 0, 0, 0);
-}
-
-TEST(lenient_skips_what_it_does_not_know)
-{
-    OwnedText messages =
-        scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
-    assert_string_equal(text_c(&messages), "3:1: warning: skipped unknown element 'ma:steel'\n"
-                                           "4:27: warning: skipped 'tex:earth.xpm'\n");
 }
 
 // Blanks next to commas, a brightness above 1, checkers and the names of textures.
