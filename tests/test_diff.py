@@ -2,6 +2,7 @@
 """Tests glint diff: its exit status, what it refuses, its report as text and JSON, and its heat map.
 
 run_tests: sanitized"""
+import math
 import struct
 
 from glint import ROOT, SPHERE, TestCase, main, write
@@ -98,6 +99,54 @@ class Diff(TestCase):
         self.assertEqual((report["worst"]["x"], report["worst"]["y"], report["worst"]["image"]), (5, 0, [0, 0, 0]))
         self.assertGreater(report["flip"]["max"], 0.05)
         self.assertEqual(report["flip"]["pixels_per_degree"], 67)
+
+    def test_values(self):
+        """Values by hand, or those of FLIP by its authors' program, flip-evaluator 1.7. test_diff_metrics.py has more."""
+        side, count, nan, inf = 64, 64 * 64, math.nan, math.inf
+        light = ((128 / 255 + 0.055) / 1.055) ** 2.4
+        for name, gray, x in ("gray", 128, None), ("spot", 128, 20 * side + 40), ("step", 129, None), ("black", 0, None), ("white", 255, None):
+            ppm(f"{name}.ppm", gray, x, side, side)
+        holes = [128 / 255] * 3 * count
+        holes[30] = inf
+        npy("full.npy", holes, "<f4", (side, side, 3))
+        holes[3 * (2 * side + 7) + 1] = nan
+        npy("holes.npy", holes, "<f4", (side, side, 3))
+        npy("few.npy", (0, 1, nan, 2, 4, 3), shape=(1, 6))
+        npy("others.npy", (1, 1, 5, 2, 2, -inf), shape=(1, 6))
+        # every number 1e-6 to 5000e-6 once, in a jumble, of both signs
+        npy("zeros.npy", [0] * 5000, shape=(1, 5000))
+        npy("jumble.npy", [(i * 1237 % 5000 + 1) * (1e-6 if i % 2 else -1e-6) for i in range(5000)], shape=(1, 5000))
+        for reference, image, values in (
+            ("gray.ppm", "gray.ppm", {
+                "differing_values": 0, "srgb8.off_by_1": 0, "srgb8.off_by_2_or_more": 0, "linear.psnr": inf, "srgb8.psnr": inf,
+                "flip.mean": 0, "flip.max": 0, "linear.max_abs": 0}),
+            ("gray.ppm", "spot.ppm", {
+                "differing_values": 3, "srgb8.off_by_1": 0, "srgb8.off_by_2_or_more": 3, "worst.x": 40, "worst.y": 20,
+                "linear.max_abs": (light, 1e-7), "linear.rmse": (light / side, 1e-8), "linear.bias": (-light / count, 1e-9),
+                "linear.p99_9": 0,  # 1 of 4096 is less than 0.1 %
+                "linear.rel_mse": (light**2 / (light**2 + 0.01) / count, 1e-9),
+                "srgb8.psnr": (10 * math.log10(count * 255**2 / 128**2), 1e-9),
+                "flip.mean": (0.00041315, 1e-7), "flip.max": (0.171734, 2e-6)}),
+            ("gray.ppm", "step.ppm", {
+                "srgb8.off_by_1": 3 * count, "srgb8.off_by_2_or_more": 0, "srgb8.psnr": (48.1308, 1e-4),
+                "flip.mean": (0.0298688, 1e-5), "flip.max": (0.0298688, 1e-5)}),
+            ("black.ppm", "white.ppm", {"linear.psnr": (0, 1e-9), "linear.rel_mse": (100, 1e-9), "flip.mean": (0.967392, 1e-5)}),
+            ("full.npy", "holes.npy", {
+                "differing_values": 1, "nonfinite_pixels.reference": 1, "nonfinite_pixels.image": 2, "linear.values": 3 * count - 2,
+                "linear.max_abs": 0, "worst.x": 7, "worst.y": 2, "flip.max": (0.5, 0.499)}),  # the missing number shows as none
+            ("few.npy", "others.npy", {
+                "linear.values": 4, "linear.max_abs": 2, "linear.bias": -0.25, "linear.rmse": (1.25**0.5, 1e-15),
+                "linear.psnr": (-10 * math.log10(1.25), 1e-14), "linear.rel_mse": ((1 / 0.01 + 4 / 16.01) / 4, 1e-13), "linear.p99_9": 2}),
+            ("zeros.npy", "jumble.npy", {"linear.p99_9": (4995e-6, 1e-9), "linear.max_abs": (5000e-6, 1e-9)}),
+        ):
+            report = self.json(f"diff {reference} {image} --json", status=0 if reference == image else 3)
+            for key, expected in values.items():
+                group, _, member = key.partition(".")
+                found = report[group][member] if member else report[group]
+                found = inf if found is None else found  # JSON has no infinity
+                value, tolerance = expected if isinstance(expected, tuple) else (expected, 0)
+                with self.subTest(f"{image}: {key}"):
+                    self.assertTrue(found == value or abs(found - value) <= tolerance, f"{found}, expected {value}")
 
     def verdicts(self, command, status):
         report = self.json(f"diff {command} --json", status=status)
