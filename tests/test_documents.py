@@ -2,19 +2,20 @@
 """Checks that sentences of the documents that repeat a measured number agree with docs/measurements, at the digits that they
 give.
 
-The tables between <!-- measured --> are tested by tests/report.sh.
+The tables between <!-- measured --> are tested by tests/report.sh. Also checks docs/scene-format.md against what glint reads.
 """
 import contextlib
 import importlib.util
 import io
 import json
+import os
 import re
 import statistics
 import unittest
 from functools import cache
 from importlib.machinery import SourceFileLoader
 
-from glint import ROOT, main, read
+from glint import ROOT, SPHERE, TestCase, main, read, write
 
 
 @cache
@@ -334,6 +335,45 @@ class Documents(unittest.TestCase):
                     for page in re.findall(r"\bdocs/[\w-]+\.(?:md|[15])\b", path.read_text(errors="replace")):
                         with self.subTest(f"{path.relative_to(ROOT)}: {page}"):
                             self.assertTrue((ROOT / page).exists())
+
+
+# Names of CSS Color Module Level 3, section 4, with their values.
+COLORS = """aqua 00ffff black 000000 blue 0000ff brown a52a2a cyan 00ffff fuchsia ff00ff gold ffd700 gray 808080 green 008000 grey 808080
+    lime 00ff00 magenta ff00ff maroon 800000 navy 000080 olive 808000 orange ffa500 pink ffc0cb purple 800080 red ff0000 silver c0c0c0
+    teal 008080 violet ee82ee white ffffff yellow ffff00""".split()
+
+
+class SceneFormat(TestCase):
+    page = read(ROOT / "docs/scene-format.md")
+
+    def test_examples_are_read(self):
+        """Some examples of YAML are only a camera."""
+        os.symlink(ROOT / "scenes", "scenes")
+        names = []
+        for language, example in re.findall(r"(?ms)^```(yaml|rt|cfg|nff)\n(.*?^)```$", self.page):
+            names.append(write(f"{len(names)}.{language}", example))
+        self.assertEqual([name[2:] for name in names], ["yaml", "yaml", "rt", "cfg", "nff"])
+        errors = self.glint(f"check {' '.join(names)}").stderr
+        camera_alone = r"(\w+\.yaml: warning: )no objects: only the background is shown\n\1no lights: only ambient light and emission are shown\n"
+        self.assertEqual(re.sub(camera_alone, "", errors), "")
+
+    def test_shapes_are_named(self):
+        write("shape.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nobjects: [{x: {}}]\n")
+        shapes = self.refuses("check shape.yaml", "unknown shape 'x'").stderr.partition("the choices are ")[2].splitlines()[0].split(", ")
+        self.assertGreaterEqual(len(shapes), 13)
+        for shape in shapes:
+            self.assertIn(f"\n| `{shape}` | ", self.page)
+
+    def test_names_of_colors_are_those_of_css(self):
+        names, values = COLORS[::2], [f"'#{value}'" for value in COLORS[1::2]]
+        self.assertEqual(re.findall(r"`(\w+)`", self.page.partition("value in CSS: ")[2].partition("\n\n")[0]), names)
+        for name, colors in ("names", names), ("values", values):
+            balls = "".join(f"  - sphere: {{center: [{i - 11.5}, 0, 0], radius: 0.5, material: {{color: {color}, reflection: 0.1}}}}\n"
+                            for i, color in enumerate(colors))
+            camera = "camera: {position: [0, 0, -40], look_at: [0, 0, 0], fov: 3}\nambient: 1\n"
+            write(f"{name}.yaml", camera + "".join(SPHERE.splitlines(True)[1:6]) + balls)
+            self.glint(f"render {name}.yaml --size 96x8 -o {name}.npy")
+        self.assertSameBytes("names.npy", "values.npy")
 
 
 if __name__ == "__main__":
