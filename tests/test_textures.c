@@ -80,6 +80,8 @@ static void check_seen(const char *camera, const char *object, double red, doubl
 }
 
 #define BALL          "sphere: {center: [0, 0, 0], radius: 1,"
+#define WALL          "plane: {point: [0, 0, 0], normal: [0, 0, 1],"
+#define SQUARE        "mesh: {file: tests/textures/quad.obj,"
 #define FROM(x, y, z) "position: [" #x ", " #y ", " #z "], look_at: [0, 0, 0], fov: 0.01"
 
 TEST(sphere_shows_east_and_west)
@@ -141,42 +143,28 @@ static double texture_between(const TestTexture *texture, double u, double v, co
 
 enum { WIDTH = 61, HEIGHT = 47 };
 
-typedef void (*TextureMap)(Vector3 position, Vector3 normal, double *u, double *v);
+// u and v as functions of x, y, z and 1.
+typedef double TextureMap[2][4];
 
-static void map_sphere(Vector3 position, Vector3 normal, double *u, double *v)
-{
-    (void)position;
-    *u = atan2(normal.x, normal.z) / (2 * M_PI) + 0.5;
-    *v = asin(fmin(fmax(normal.y, -1), 1)) / M_PI + 0.5;
-}
+// A texture that is twice as wide as tall has size 2 on the planes. On the last mesh it is three times in
+// each direction, the whole texture in the middle.
+static const TextureMap map_wall = {{0.5, 0, 0, 0}, {0, 1, 0, 0}},
+                        map_wall_from_behind = {{-0.5, 0, 0, 0}, {0, 1, 0, 0}},
+                        map_floor = {{0.5, 0, 0, 0}, {0, 0, -1, 0}},
+                        map_quad = {{0.25, 0, 0, 0.5}, {0, 0.25, 0, 0.5}},
+                        map_wide = {{0.75, 0, 0, 0.5}, {0, 0.75, 0, 0.5}};
 
-// Maps a texture that is twice as wide as tall and has size 2.
-static void map_wall(Vector3 position, Vector3 normal, double *u, double *v)
+// Without a map the surface is a sphere.
+static void texture_place(const TextureMap *map, Vector3 p, Vector3 normal, double *u, double *v)
 {
-    (void)normal;
-    *u = position.x / 2;
-    *v = position.y;
-}
-
-static void map_wall_from_behind(Vector3 position, Vector3 normal, double *u, double *v)
-{
-    (void)normal;
-    *u = -position.x / 2;
-    *v = position.y;
-}
-
-static void map_floor(Vector3 position, Vector3 normal, double *u, double *v)
-{
-    (void)normal;
-    *u = position.x / 2;
-    *v = -position.z;
-}
-
-static void map_quad(Vector3 position, Vector3 normal, double *u, double *v)
-{
-    (void)normal;
-    *u = (position.x + 2) / 4;
-    *v = (position.y + 2) / 4;
+    if (map) {
+        const double(*rows)[4] = *map;
+        *u = rows[0][0] * p.x + rows[0][1] * p.y + rows[0][2] * p.z + rows[0][3];
+        *v = rows[1][0] * p.x + rows[1][1] * p.y + rows[1][2] * p.z + rows[1][3];
+    } else {
+        *u = atan2(normal.x, normal.z) / (2 * M_PI) + 0.5;
+        *v = asin(fmin(fmax(normal.y, -1), 1)) / M_PI + 0.5;
+    }
 }
 
 static Vector3 vector_at(const double *values, size_t pixel)
@@ -185,7 +173,8 @@ static Vector3 vector_at(const double *values, size_t pixel)
 }
 
 // Checks each pixel against its place in the texture, where texels are larger than pixels.
-static void check_places(const char *camera, const char *object, TextureMap map, const TextureWrap wraps[2])
+static void check_places(const char *camera, const char *object, const TextureMap *map,
+                         const TextureWrap wraps[2])
 {
     TestTexture texture = texture_make(4, 2);
     texture_write(&texture);
@@ -204,7 +193,7 @@ static void check_places(const char *camera, const char *object, TextureMap map,
             if (vector_dot(normal, from_eye) > -0.3 * vector_length(from_eye))
                 continue; // foreshortened texels
             double u, v;
-            map(vector_add(from_eye, scene.camera.position), normal, &u, &v);
+            texture_place(map, vector_add(from_eye, scene.camera.position), normal, &u, &v);
             for (size_t channel = 0; channel < 3; channel++)
                 largest = error_max(largest, fabs(film.color[3 * i + channel] -
                                                   texture_between(&texture, u, v, wraps, channel)));
@@ -218,38 +207,26 @@ static void check_places(const char *camera, const char *object, TextureMap map,
 
 TEST(sphere_agrees_all_around)
 {
-    check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
-    check_places("position: [0.1, -0.3, -5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
-                 on_sphere); // the seam
-    check_places("position: [0.1, 5, 0.2], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
-                 on_sphere); // a pole
-    check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
+    check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, NULL, on_sphere);
+    check_places("position: [0.1, -0.3, -5], look_at: [0, 0, 0], fov: 25", BALL, NULL, on_sphere); // the seam
+    check_places("position: [0.1, 5, 0.2], look_at: [0, 0, 0], fov: 25", BALL, NULL, on_sphere);   // a pole
+    check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, NULL, on_sphere);
 }
 
 TEST(planes_repeat_it)
 {
-    check_places("position: [0.3, 0.2, 3], look_at: [0.5, 0.5, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 0, 1],", map_wall, repeated);
+    check_places("position: [0.3, 0.2, 3], look_at: [0.5, 0.5, 0]", WALL, &map_wall, repeated);
     check_places("position: [0.3, 0.2, -3], look_at: [0.5, 0.5, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 0, -3],", map_wall_from_behind, repeated);
+                 "plane: {point: [0, 0, 0], normal: [0, 0, -3],", &map_wall_from_behind, repeated);
     check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
-                 "plane: {point: [0, 0, 0], normal: [0, 1, 0],", map_floor, repeated);
+                 "plane: {point: [0, 0, 0], normal: [0, 1, 0],", &map_floor, repeated);
     check_places("position: [0.3, 3, 0.5], look_at: [0, 0, 0]",
-                 "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", map_floor, repeated);
+                 "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", &map_floor, repeated);
 }
 
 TEST(meshes_have_it_by_uv)
 {
-    check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/quad.obj,",
-                 map_quad, repeated);
-}
-
-// Maps a texture three times in each direction, with the whole texture in the middle.
-static void map_wide(Vector3 position, Vector3 normal, double *u, double *v)
-{
-    (void)normal;
-    *u = 0.75 * position.x + 0.5;
-    *v = 0.75 * position.y + 0.5;
+    check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", SQUARE, &map_quad, repeated);
 }
 
 TEST(meshes_wrap_it)
@@ -259,7 +236,16 @@ TEST(meshes_wrap_it)
                                            {TEXTURE_MIRRORED, TEXTURE_CLAMPED}};
     for (size_t i = 0; i < COUNT_OF(wraps); i++)
         check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/wide.obj,",
-                     map_wide, wraps[i]);
+                     &map_wide, wraps[i]);
+}
+
+// Sets `mean` to the mean of all texels.
+static void texture_mean(const TestTexture *texture, double mean[3])
+{
+    const uint32_t count = texture->width * texture->height;
+    memset(mean, 0, 3 * sizeof *mean);
+    for (uint32_t k = 0; k < 3 * count; k++)
+        mean[k % 3] += (double)texture->colors[k / 3][k % 3] / count;
 }
 
 // Far away, where a pixel sees more than the whole texture, its color is the mean of all texels. No dimension
@@ -269,15 +255,13 @@ TEST(far_away_it_is_its_mean)
     static const uint32_t sizes[][2] = {{8, 8}, {5, 3}, {7, 1}, {1, 6}, {1, 1}};
     for (size_t i = 0; i < COUNT_OF(sizes); i++) {
         TestTexture texture = texture_make(sizes[i][0], sizes[i][1]);
-        uint32_t count = texture.width * texture.height;
-        double mean[3] = {0};
-        for (uint32_t k = 0; k < 3 * count; k++)
-            mean[k % 3] += (double)texture.colors[k / 3][k % 3] / count;
+        double mean[3];
+        texture_mean(&texture, mean);
         texture_write(&texture);
         const char *far_camera = "position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5";
         check_seen(far_camera, BALL, mean[0], mean[1], mean[2]);
-        check_seen(far_camera, "plane: {point: [0, 0, 0], normal: [0, 0, 1],", mean[0], mean[1], mean[2]);
-        check_seen(far_camera, "mesh: {file: tests/textures/quad.obj,", mean[0], mean[1], mean[2]);
+        check_seen(far_camera, WALL, mean[0], mean[1], mean[2]);
+        check_seen(far_camera, SQUARE, mean[0], mean[1], mean[2]);
     }
 }
 
@@ -293,16 +277,15 @@ TEST(between_levels_it_blends)
     double finer = 0, coarser = 0.5 * (1 - 0.25); // of 4 columns: white in half of the first
     check_seen(formatted("position: [0.75, 0.75, 1], look_at: [0.75, 0.75, 0], fov: %.17g",
                          2 * atan(0.375) * 180 / M_PI),
-               "plane: {point: [0, 0, 0], normal: [0, 0, 1],", (finer + coarser) / 2, 0, 0);
+               WALL, (finer + coarser) / 2, 0, 0);
 }
 
 // A mirror's texture of a texture is filtered for the whole path to the eye.
 TEST(mirrors_filter_textures)
 {
     TestTexture texture = texture_make(8, 8);
-    double mean[3] = {0};
-    for (uint32_t k = 0; k < 192; k++)
-        mean[k % 3] += (double)texture.colors[k / 3][k % 3] / 64;
+    double mean[3];
+    texture_mean(&texture, mean);
     texture_write(&texture);
     check_seen("position: [0, 0, 1000], look_at: [0, 0, 0], fov: 5",
                "plane: {point: [0, 0, 0], normal: [0, 0, 1], material: {color: [0, 0, 0], reflection: 1}}},\n"
@@ -405,8 +388,7 @@ static void check_shade(const char *camera, const char *object, const char *more
         fail_msg("%s: the shade is %.9g, not %.9g", text, film.color[0], expected);
 }
 
-#define SQUARE "mesh: {file: tests/textures/quad.obj,"
-#define FRONT  FROM(0.1, 0.2, 5)
+#define FRONT FROM(0.1, 0.2, 5)
 
 // Lambert's cosine of normals that are tilted by 1/2 along u or v, with the light at 3/5 of u or v.
 TEST(normal_maps_tilt_normals)
@@ -501,33 +483,6 @@ TEST(jpeg_is_read)
     tjDestroy(encoder);
 }
 
-#define MATERIALS                                                                                            \
-    "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 5, "                 \
-    "5]}}]\nmaterials:\n"
-
-TEST(scene_faults_are_reported)
-{
-    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
-                    "4:21: error: 'color' cannot be combined with 'image'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n",
-                    "4:13: error: 'size' needs an 'image' or a 'normal_map'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
-                    "4:27: error: 'size' must be greater than 0, not '0'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, cutout: 50}\n",
-                    "4:29: error: 'cutout' must be from 0 to 1, not '50'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {cutout: 0.5}\n", "4:6: error: material lacks 'image'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
-                    "4:14: error: 'image' must be the name of a file, not a list of 2\n");
-    assert_messages(
-        "s.yaml",
-        MATERIALS "  a: {image: a.png}\nobjects: [{box: {min: [0, 0, 0], max: [1, 1, 1], material: a}}]\n",
-        "5:60: error: images and normal maps lie on a sphere, plane, disc or mesh, not on a box\n");
-    assert_messages("s.yaml",
-                    MATERIALS
-                    "  a: {image: a.png}\nobjects: [{mesh: {file: tests/textures/bare.obj, material: a}}]\n",
-                    "5:60: error: the mesh has no uv for the material's images\n");
-}
-
 // Checks the message about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
@@ -555,11 +510,11 @@ TEST(textures_are_shared)
 {
     const TestTexture texture = texture_make(3, 2);
     texture_write(&texture);
-    OwnedScene scene =
-        scene_of_text("scenes/images/s.yaml",
-                      formatted(MATERIALS "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
+    OwnedScene scene = scene_of_text(
+        "scenes/images/s.yaml", formatted("camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nmaterials:\n"
+                                          "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
                                           "  c: {image: globe.png}\n  d: {image: %s}\n",
-                                texture_path));
+                                          texture_path));
     assert_int_equal(scene.textures.count, 3);
     assert_string_equal(scene.textures.items[0].path, "scenes/images/globe.png");
     assert_string_equal(scene.textures.items[2].path, texture_path);
