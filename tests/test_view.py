@@ -64,7 +64,6 @@ class View(TestCase):
         position = numbers(first, "position")
         while numbers(window_camera_in_flight(window), "position") == position:
             pass
-        window.close()
 
     def test_double_click(self):
         """The camera looks at the point, however far apart a busy machine makes the clicks."""
@@ -74,7 +73,6 @@ class View(TestCase):
         camera = window.check()
         self.assertEqual(numbers(camera, "position"), numbers(first, "position"))
         self.assertNotEqual(numbers(camera, "look_at"), numbers(first, "look_at"))
-        window.close()
 
     def test_resize_and_save(self):
         window = Window(self)
@@ -87,7 +85,6 @@ class View(TestCase):
         self.assertEqual(window.saved(), "scene-2.png")
         xdotool("windowunmap", "--sync", window.id, "windowmap", "--sync", window.id, "windowfocus", window.id)
         window.check((101, 73))
-        window.close()
 
     def test_reload(self):
         window = Window(self)
@@ -106,7 +103,6 @@ class View(TestCase):
         write("scene.yaml", moved)  # the message is gone, and the camera is the file's
         window.shows_at_last(self.image_of(moved))
         self.assertEqual(numbers(window.camera(), "position"), [0.5, 1, -5])
-        window.close()
 
     def test_reload_of_a_mesh(self):
         """When a mesh changes, the view keeps its moved camera."""
@@ -117,7 +113,6 @@ class View(TestCase):
         window.key("x")  # hides it
         write("mesh.obj", MESH.replace("1 1 0", "1.5 1 0"))
         window.shows_at_last(self.image_of(re.sub("^camera: .*", camera, SCENE)))
-        window.close()
 
     def test_reload_keeps_what_is_set(self):
         window = Window(self, options="--set background=red")
@@ -125,7 +120,6 @@ class View(TestCase):
         changed = SCENE.replace("[0.9, 0.8, 0.7]", "[0.1, 0.8, 0.7]")
         write("scene.yaml", changed)
         window.shows_at_last(self.image_of(changed.replace("[0.125, 0.25, 0.5]", "[1, 0, 0]")))
-        window.close()
 
     def test_reload_of_an_image(self):
         """If an image becomes unreadable, the last scene stays and can be moved and saved."""
@@ -144,7 +138,6 @@ class View(TestCase):
         window.key("x")
         shutil.copy("before/image.png", "image.png")
         window.shows_at_last(png_rows("before.png"))
-        window.close()
 
     def test_reload_of_what_cannot_be_rendered(self):
         """The last scene stays, which can be saved and moved."""
@@ -155,7 +148,6 @@ class View(TestCase):
         window.check()
         window.key("Left")
         window.check()
-        window.close()
 
     def test_reload_of_an_included_file(self):
         """The included camera cannot be written into the scene's file."""
@@ -171,7 +163,6 @@ class View(TestCase):
         changed = background.replace("0.125", "0.75")
         write("stage.yaml", camera + changed)
         window.shows_at_last(self.image_of(SCENE.replace(background, changed)))
-        window.close()
 
     def test_reload_of_a_linked_file(self):
         """A file is watched where symbolic links lead, and the camera is written there."""
@@ -203,7 +194,6 @@ class View(TestCase):
         window.line("^scene.yaml:5:.*other.obj: No such file")
         write("other.obj", MESH.replace("1 1 0", "1.5 1 0"))
         window.shows_at_last(self.image_of(text))
-        window.close()
 
     def test_written_camera(self):
         """The camera is written into the file, whose other bytes stay. The file is not re-read for it."""
@@ -227,7 +217,6 @@ class View(TestCase):
         write("scene.yaml", SCENE)  # what others write is read
         window.key("x")
         window.shows_at_last(self.image_of(SCENE))
-        window.close()
         write("scene.cfg", "")
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
@@ -238,7 +227,6 @@ class View(TestCase):
             window = Window(self, "-", stdin=scene)
         window.shows_at_last(self.image_of(SCENE))
         self.assertEqual(window.saved(), "image-1.png")
-        window.close()
 
     def test_changes_during_a_write(self):
         """Changes that others write just before or while the camera is written are read."""
@@ -253,7 +241,6 @@ class View(TestCase):
                 window.key("x")  # hides it
                 os.remove("late")
                 window.shows_at_last(self.image_of(read("scene.yaml")))
-        window.close()
 
     def test_camera_of_another_file(self):
         """The camera's file is watched, and the camera is written into it."""
@@ -270,7 +257,6 @@ class View(TestCase):
         moved = SCENE.replace("-4]", "-5]")
         write("shot.yaml", moved)
         window.shows_at_last(self.image_of(moved))
-        window.close()
 
     @staticmethod
     def failing_calls():
@@ -282,7 +268,6 @@ class View(TestCase):
         window = Window(self, LD_PRELOAD=self.failing_calls())
         window.line("^glint: warning: changes to files will not be noticed: Too many open files")
         window.check()
-        window.close()
 
     def test_unwatched_folders(self):
         """Folders that cannot be watched are reported once, however many files they hold."""
@@ -309,7 +294,6 @@ class View(TestCase):
         window.check()  # the last scene stays
         window.key("Right")
         window.check()
-        window.close()
 
     def test_slow_scene(self):
         """The window is shown and can be closed while the scene is read, here from a pipe. What is saved meanwhile is noticed."""
@@ -357,7 +341,6 @@ class View(TestCase):
                 window.key(key)
                 window.title_at_last(f", color, {precision}, ")
                 window.shows_at_last(self.image_of(SCENE, f"--precision {precision}"))
-        window.close()
 
     def test_legend(self):
         """The scale of the errors is a bar of many colors in the lower right corner."""
@@ -366,7 +349,6 @@ class View(TestCase):
         window.key("shift+v")
         window.title_at_last(", error against double, ")
         wait_until(lambda: window.most_colors_of_a_column(range(160, 320), range(180, 360)) >= 64, "there is no legend")
-        window.close()
 
     def shows_frame(self, window, text, frame):
         """Checks that the display, except for the time line's mark, and the saved image are what glint render makes of the frame."""
@@ -407,7 +389,6 @@ class View(TestCase):
         self.assertNotIn("frame", xdotool("getwindowname", window.id))
         window.key("space", "period")
         window.check()
-        window.close()
 
     def stays(self, window):
         """Checks that an animation has paused, and returns its frame."""
@@ -432,7 +413,6 @@ class View(TestCase):
         write("scene.yaml", ANIMATION.replace("material", "metarial"))  # what cannot be read stops it
         window.line("^scene.yaml:6:.*metarial")
         self.stays(window)
-        window.close()
 
     def test_recorded_keys(self):
         """K adds a key to the file, whose other keys and text stay. The view follows them."""
@@ -461,7 +441,6 @@ class View(TestCase):
         keyed = Path("scene.yaml").read_text()
         self.assertEqual(self.image_of(keyed, "--frames 5"), self.image_of(text, "--frames 5"))
         self.assertEqual(keyed.count("5: ["), 2)
-        window.close()
 
     def test_help(self):
         window = Window(self)
@@ -471,7 +450,6 @@ class View(TestCase):
         window.changes_at_last(before)
         window.key("h")
         window.check()
-        window.close()
 
     def test_facts(self):
         """A pixel's object, line, material, t and normal, and the tree of its rays, follow the camera."""
@@ -502,10 +480,9 @@ class View(TestCase):
         window.key("i")
         window.line(r"^pixel 80,119: plane 4, scene.yaml:8, t ")
         window.key("i")
-        window.close()
 
     def test_interrupt(self):
-        window = Window(self)
+        window = Window(self, status=130)
         window.process.send_signal(signal.SIGINT)
         self.assertEqual(window.process.wait(DEADLINE), 130)
 

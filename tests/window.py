@@ -95,8 +95,8 @@ def png_rows(path):
 class Window:
     """A running glint view, whose lines of output are read as they come."""
 
-    def __init__(self, test, scene="scene.yaml", options="", waits=True, stdin=subprocess.DEVNULL, **environment):
-        self.test, self.lines = test, queue.Queue()
+    def __init__(self, test, scene="scene.yaml", options="", waits=True, stdin=subprocess.DEVNULL, status=0, **environment):
+        self.test, self.status, self.lines = test, status, queue.Queue()
         command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
         # the libraries that SDL loads and unloads leak
         sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0:verify_asan_link_order=0"
@@ -107,6 +107,7 @@ class Window:
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
         test.addCleanup(self.kill)
+        test.addCleanup(self.close)
         self.id = self.shown_at_last()
         xdotool("windowfocus", "--sync", self.id, "windowmove", self.id, 0, 0)
         if waits:
@@ -216,6 +217,8 @@ class Window:
     def changes_at_last(self, before):
         wait_until(lambda: screen() != before, "the display does not change")
 
-    def close(self, status=0):
-        self.key("Escape")
-        self.test.assertEqual(self.process.wait(DEADLINE), status)
+    def close(self):
+        """Closes the window, which each test does at its end. The program must end with the status."""
+        if self.process.poll() is None:
+            self.key("Escape")
+        self.test.assertEqual(self.process.wait(DEADLINE), self.status)
