@@ -9,7 +9,7 @@ A section is a scene and the messages that it must get, each as `line:column: se
     #### set PATH=VALUE                an override; any number of them
     #### s/PATTERN/REPLACEMENT/        replaces each match of a regular expression in the text so far
     text…                              \xNN stands for a byte
-    #### repeat FIRST LAST text        a line per number, with the number for each %d
+    #### repeat FIRST LAST line        a line or message per number, with the number for each %d
     #### no newline                    removes the end of the last line
     messages…
 
@@ -30,7 +30,13 @@ def scenes(table):
         start, *parts = re.split("(?m)^#### scene ", section)
         for part in parts:
             name, body = part.split("\n", 1)
+            body = re.sub(r"(?m)^#### repeat (\d+) (\d+) (.*\n)", lines_of, body)
             yield scene_of(name, start, re.findall(".*\n", body))
+
+
+def lines_of(repeat):
+    first, last, line = repeat.groups()
+    return "".join(line.replace("%d", str(i)) for i in range(int(first), int(last) + 1))
 
 
 def scene_of(name, content, lines):
@@ -41,8 +47,6 @@ def scene_of(name, content, lines):
         elif found := re.fullmatch("#### s/([^/]*)/([^/]*)/\n", line):
             content, count = re.subn(found[1], found[2], content, flags=re.MULTILINE)
             assert count > 0, f"{name}: {line}"
-        elif found := re.fullmatch(r"#### repeat (\d+) (\d+) (.*\n)", line):
-            content += "".join(found[3].replace("%d", str(i)) for i in range(int(found[1]), int(found[2]) + 1))
         elif line == "#### no newline\n":
             content = content[:-1]
         elif MESSAGE.match(line):
