@@ -247,8 +247,6 @@ static Mesh mesh_in_view(void)
 }
 
 typedef enum { FLAT, ROUND, OVALS, PLANETS, OPTICS, FAMILY_COUNT } Family;
-static const char *const family_names[FAMILY_COUNT] = {"flat shapes and spheres", "round shapes", "ovals",
-                                                       "planets", "optics"};
 
 // Returns an object of the family. Every other scene of optics has only spheres.
 static Object object_in_view(const Scene *scene, Family family, unsigned seed, size_t index)
@@ -333,35 +331,40 @@ static Scene scene_attacking(Family family, unsigned seed)
 // Each seed needs separate kernels, so scenes share a few seeds. The errors also depend on the operands.
 enum { PERTURB_SEEDS = 7 };
 
-// The same kernels for all scenes of a family, with the BVH and without it.
-static const FeatureSet family_features[FAMILY_COUNT] = {
-    FEATURE_BVH,
-    FEATURE_BVH | FEATURE_PLANES | FEATURE_CYLINDERS | FEATURE_CONES | FEATURE_PARABOLOIDS |
-        FEATURE_SUPERELLIPSOIDS | FEATURE_TORI,
-    FEATURE_BVH | FEATURE_SPHERES | FEATURE_DISCS | FEATURE_CYLINDERS | FEATURE_CONES | FEATURE_PARABOLOIDS |
-        FEATURE_SUPERELLIPSOIDS | FEATURE_TORI,
-    FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_SPHERES | FEATURE_CYLINDERS, FEATURE_BVH};
+// The feature sets give the same kernels to all scenes of a family, with the BVH and without it. Optics has
+// enough bounces for rays to run along several chords of a sphere. The shares of these crowded scenes'
+// samples that may be re-rendered are a little above the measured 0.62, 0.18, 0.20, 0.54, 0.22 and 0.002,
+// 0.02, 0.004, 0.03, 0.00035. For optics without chords 0.26 and 0.003 were measured.
+#define ROUND_FEATURES                                                                                       \
+    (FEATURE_BVH | FEATURE_CYLINDERS | FEATURE_CONES | FEATURE_PARABOLOIDS | FEATURE_SUPERELLIPSOIDS |       \
+     FEATURE_TORI)
+static const struct {
+    const char *name;
+    FeatureSet features;
+    uint32_t bounce_count;
+    double rerendered_max, uncertified_max;
+    bool is_long; // whose kernels take long to build
+} families[FAMILY_COUNT] = {
+    [FLAT] = {"flat shapes and spheres", FEATURE_BVH, 2, 0.7, 0.005, false},
+    [ROUND] = {"round shapes", ROUND_FEATURES | FEATURE_PLANES, 2, 0.25, 0.03, false},
+    [OVALS] = {"ovals", ROUND_FEATURES | FEATURE_SPHERES | FEATURE_DISCS, 2, 0.25, 0.01, false},
+    [PLANETS] = {"planets", FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_SPHERES | FEATURE_CYLINDERS, 2, 0.65,
+                 0.06, true},
+    [OPTICS] = {"optics", FEATURE_BVH, 5, 0.24, 0.0005, true},
+};
 
-// Optics has enough bounces for rays to run along several chords of a sphere.
-static const uint32_t bounce_counts[FAMILY_COUNT] = {2, 2, 2, 2, 5};
-
-// The shares of these crowded scenes' samples that may be re-rendered, a little above the measured 0.62,
-// 0.18, 0.20, 0.54, 0.22 and 0.002, 0.02, 0.004, 0.03, 0.00035. For optics without chords 0.26 and 0.003 were
-// measured.
-static const double rerendered_max[FAMILY_COUNT] = {0.7, 0.25, 0.25, 0.65, 0.24},
-                    uncertified_max[FAMILY_COUNT] = {0.005, 0.03, 0.01, 0.06, 0.0005};
-
-static void check_family(Family family)
+static void check_family(void **state)
 {
-    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    const Family family = *(const Family *)*state;
+    if (!probe_has(PRECISION_CERTIFIED) || (families[family].is_long && !tests_are_long())) skip();
     const unsigned scene_count = tests_are_long() ? 70 : 3, run_count = tests_are_long() ? 3 : 2;
     size_t single_wrong = 0, compared = 0;
     uint64_t rerendered = 0, uncertified = 0;
     for (unsigned seed = 0; seed < scene_count; seed++) {
         OwnedScene scene = scene_attacking(family, seed);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-        if (tests_are_long()) settings.extra_features = family_features[family]; // one program
-        settings.bounce_count = bounce_counts[family];
+        if (tests_are_long()) settings.extra_features = families[family].features; // one program
+        settings.bounce_count = families[family].bounce_count;
         OwnedCertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += decisions_count(&scene, &reference, &settings).wrong;
@@ -373,7 +376,7 @@ static void check_family(Family family)
             const DecisionCounts certified = decisions_count(&scene, &reference, &settings);
             if (certified.violations > 0)
                 fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not uncertified",
-                         family_names[family], seed, run, certified.wrong, certified.violations);
+                         families[family].name, seed, run, certified.wrong, certified.violations);
             rerendered += certified.rerendered;
             uncertified += certified.uncertified;
         }
@@ -383,33 +386,18 @@ static void check_family(Family family)
                  uncertified_share = (double)uncertified / samples;
     print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f re-rendered, %.5f "
                   "uncertified\n",
-                  family_names[family], compared, single_wrong, rerendered_share, uncertified_share);
+                  families[family].name, compared, single_wrong, rerendered_share, uncertified_share);
     assert_true(single_wrong >= scene_count);
     // a bound that flags every pixel would be right but useless
-    assert_true(rerendered_share < rerendered_max[family]);
-    assert_true(uncertified_share < uncertified_max[family]);
+    assert_true(rerendered_share < families[family].rerendered_max);
+    assert_true(uncertified_share < families[family].uncertified_max);
 }
 
-TEST(flat_shapes_are_decided)
-{
-    check_family(FLAT);
-}
-
-TEST(round_shapes_are_decided)
-{
-    check_family(ROUND);
-}
-
-TEST(ovals_are_decided)
-{
-    check_family(OVALS);
-}
-
-TEST(planets_are_decided)
-{
-    if (!tests_are_long()) skip(); // for its kernels' builds
-    check_family(PLANETS);
-}
+TEST_CASE(flat_shapes_are_decided, check_family, &(Family){FLAT})
+TEST_CASE(round_shapes_are_decided, check_family, &(Family){ROUND})
+TEST_CASE(ovals_are_decided, check_family, &(Family){OVALS})
+TEST_CASE(planets_are_decided, check_family, &(Family){PLANETS})
+TEST_CASE(mirrors_glass_and_spots_are_decided, check_family, &(Family){OPTICS})
 
 // Planets and infinite cylinders in views so narrow that every ray skims their horizon, as does every shadow
 // ray to a light near the eye, on devices whose quotients and roots err as much as OpenCL permits.
@@ -418,7 +406,7 @@ TEST(horizons_are_decided)
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int count = tests_are_long() ? 1000 : 100;
     RenderSettings settings = small_settings(0);
-    settings.extra_features = family_features[PLANETS] | FEATURE_POINT_LIGHTS;
+    settings.extra_features = families[PLANETS].features | FEATURE_POINT_LIGHTS;
     settings.perturb_seed = 3;
     settings.lanes = 1; // built sooner
     size_t uncertified = 0;
@@ -442,12 +430,6 @@ TEST(horizons_are_decided)
             check_image(&scene, &settings, is_planet ? "a planet's horizon" : "a cylinder's horizon", radius);
     }
     assert_int_equal(uncertified, 0);
-}
-
-TEST(mirrors_glass_and_spots_are_decided)
-{
-    if (!tests_are_long()) skip(); // its kernels also take long to build
-    check_family(OPTICS);
 }
 
 // Returns a round shape in the middle of the view, squeezed by a random map.
