@@ -414,18 +414,30 @@ TEST(warnings)
                     "5:15: warning: a triangle without area is never hit\n");
 }
 
+// Reads a scene of each format.
 TEST(a_failed_scene_is_empty)
 {
-    OwnedText text = {0};
-    text_appendf(&text, LIT SPHERE "purple: 1\n");
-    OwnedMessageList messages = {0};
-    Scene scene;
-    assert_false(scene_read_text(&scene, "s.yaml", &text, false, &messages));
-    assert_null(scene.objects.items);
-    assert_null(scene.lights.items);
-    assert_int_equal(scene.objects.count, 0);
-    assert_string_equal(messages.items[0].file, "s.yaml");
-    assert_string_equal(messages.items[0].source_line, "purple: 1");
+    static const char *const cases[][3] = {
+        {"s.yaml", LIT SPHERE "purple: 1\n", "purple: 1"},
+        {"s.rt", "C 0,0,0 0,0,1 60\nL 0,0,0 1\nsp 0,0,0 1 1,1,1\nxx\n", "xx"},
+        {"s.cfg", "=>light :\n{\n position 0 0 0\n intensity 1 1 1\n}\n=>torus :\n{\n}\n", "=>torus :"},
+        {"s.nff", "v\nfrom 0 0 0\nat 0 0 1\nup 0 1 0\nangle 9\nl 0 9 0\nf 1 1 1 1 0 1 0 0\ns 0 0 0 1\nt 1\n",
+         "t 1"},
+        {"s.dat", "begin_scene\nresolution 8 8\ndirectional_light direction 0 0 1 color 1 1 1\nteapot\n",
+         "teapot"},
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        OwnedText text = {0};
+        text_appendf(&text, "%s", cases[i][1]);
+        OwnedMessageList messages = {0};
+        Scene scene;
+        assert_false(scene_read_text(&scene, cases[i][0], &text, false, &messages));
+        assert_null(scene.objects.items);
+        assert_null(scene.lights.items);
+        assert_int_equal(scene.objects.count, 0);
+        assert_string_equal(messages.items[0].file, cases[i][0]);
+        assert_string_equal(messages.items[0].source_line, cases[i][2]);
+    }
 }
 
 // A node's offsets cannot count this many bytes. Those beyond the scene here are never read.
