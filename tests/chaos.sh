@@ -4,6 +4,6 @@
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all 'a sanitized build replaces the allocators and handlers'
 unset OCL_ICD_VENDORS
-seconds=6
+seconds=8
 ! is_long || seconds=55
 tools/chaos --seconds $seconds --glint "$GLINT"

@@ -187,6 +187,7 @@ class Checkpoints(TestCase):
                 self.assertEqual(status, -9)
         saved = self.share_saved()
         self.assertAlmostEqual(self.resume("--device all --samples 3000", TWO), 1 - saved)
+        self.nothing_left("*.glint-*")
         print(f"{kills} kills, {renders} images complete between them")
 
 

@@ -1,4 +1,4 @@
-"""Provides the small files that tools/chaos renders, damages and enlarges."""
+"""Provides the small files that tools/chaos renders and enlarges."""
 import struct
 
 SCENE = """\

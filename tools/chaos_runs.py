@@ -24,7 +24,7 @@ class Command:
         self.line, self.outputs, self.fault_types, self.is_slow = line, outputs, fault_types, is_slow
         self.within = within  # "child " makes calls fail in child processes only
         self.is_resumable = "--checkpoint" in line  # resumes after a failure
-        self.status, self.written, self.counts, self.seconds = None, {}, {}, 0
+        self.status, self.written, self.counts = None, {}, {}
 
 
 class Test:
@@ -36,24 +36,6 @@ def process_seconds(process):
     """Returns the processor seconds of a running process and its reaped children."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
-
-
-def memory_share(processes):
-    """Waits for processes. When memory is short, pauses all but 16. Gives up if none ends for 5 * HANG_SECONDS."""
-    few, is_short, turned = 16, False, time.monotonic()
-    ended = turned
-    while processes and time.monotonic() < ended + 5 * HANG_SECONDS:
-        meminfo = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
-        is_short = int(meminfo["MemAvailable"].split()[0]) >> 20 < (6 if is_short else 4)
-        for i, process in enumerate(processes):
-            process.send_signal(signal.SIGSTOP if is_short and i >= few else signal.SIGCONT)
-        time.sleep(0.1)
-        remaining = [process for process in processes if process.poll() is None]
-        if len(remaining) < len(processes):
-            ended = turned = time.monotonic()
-        elif time.monotonic() > turned + 10:  # a paused process may hold a lock for which the others wait
-            remaining, turned = remaining[few:] + remaining[:few], time.monotonic()
-        processes = remaining
 
 
 class Runner:
@@ -187,9 +169,7 @@ class Runner:
         for _ in range(3):  # timings may choose a size for which the driver has not compiled a kernel
             for fault in None, command.within + counting:  # the first run fills the caches
                 self.log.unlink(missing_ok=True)
-                start = time.monotonic()
                 command.status, errors = self.finish(self.start(command.line, fault))
-                command.seconds = time.monotonic() - start
             if command.status in (0, 3, 130):
                 break
         if command.status not in (0, 3, 130) or not self.log.exists():

@@ -32,17 +32,19 @@ static void input_write(const Source *source)
     if (pwrite(input, source->bytes, source->length, 0) != length || ftruncate(input, length) != 0) abort();
 }
 
-static void image_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)source;
-    Image image;
-    if (image_read(&image, path, &(ImageReadOptions){.max_pixels = PIXELS_MAX}, messages)) image_free(&image);
-}
-
 // Checks that the errors and the verdict agree.
 static void verdict_check(bool is_read, const MessageList *messages)
 {
     if (is_read == (message_count(messages, MESSAGE_ERROR) > 0)) abort();
+}
+
+static void image_fuzz(const char *path, const Source *source, MessageList *messages)
+{
+    (void)source;
+    Image image;
+    const bool is_read = image_read(&image, path, &(ImageReadOptions){.max_pixels = PIXELS_MAX}, messages);
+    verdict_check(is_read, messages);
+    if (is_read) image_free(&image);
 }
 
 static void mesh_fuzz(const char *path, const Source *source, MessageList *messages)
