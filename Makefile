@@ -169,11 +169,16 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(BUILD)/tests.a
 opencl_calls    := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
 failing         := $(wildcard tests/failing/*.c)
 failing_objects := $(failing:%.c=$(BUILD)/%.o)
-failing_tests   := $(addprefix $(BUILD)/tests/,test_opencl_failure test_device_loss test_command_failure)
+failing_tests   := $(BUILD)/tests/test_opencl_failure $(BUILD)/tests/test_device_loss
 
 $(failing_tests): private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=statvfs64 \
                              -Wl,--wrap=pthread_create
 $(failing_tests): $(failing_objects)
+
+# Tests preload this library into glint.
+$(BUILD)/tests/faults.so: tests/failing/faults.c tests/failing/calls.c tests/failing/faults.h Makefile
+	@mkdir -p $(@D)
+	$(CC) -std=gnu11 -DPRELOADED -I. $(CFLAGS) $(LDFLAGS) -fPIC -shared $(filter %.c,$^) -ldl -lpthread -o $@
 
 $(BUILD)/tests/test_readers: $(BUILD)/tests/fuzz/readers.o
 
@@ -219,7 +224,7 @@ $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(text)' | cmp -s - $@ || printf '%s\n' '$(text)' > $@
 
-tests: $(tests) kernel_text library
+tests: $(tests) $(BUILD)/tests/faults.so kernel_text library
 
 test:
 	+@tools/run_tests $(BUILD)

@@ -25,7 +25,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(os.environ.get("GLINT", ROOT / "build/glint")).resolve()
-IS_SANITIZED = Path(os.environ.get("BUILD", PROGRAM.parent)).name.endswith("-sanitize")
+BUILD = Path(os.environ.get("BUILD", PROGRAM.parent))
+IS_SANITIZED = BUILD.name.endswith("-sanitize")
 IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
 # SPHERE, PLANET and BALLS have the same features, so that the same kernels serve the tests of each.
 SPHERE = """\
@@ -98,6 +99,17 @@ def shim_build(name, source, *flags):
     return os.path.abspath(name)
 
 
+def preloaded(*libraries, **variables):
+    """Returns an environment that preloads libraries. They may come before a sanitizer, since they call nothing before main."""
+    options = f"{os.environ.get('ASAN_OPTIONS', '')}:verify_asan_link_order=0"
+    return {"LD_PRELOAD": " ".join(map(str, libraries)), "ASAN_OPTIONS": options, **variables}
+
+
+def faults(rules):
+    """Returns an environment in which calls fail by rules (tests/failing/faults.h)."""
+    return preloaded(BUILD.resolve() / "tests/faults.so", GLINT_FAULTS=rules)
+
+
 def need_device():
     """Skips the whole test if there is no OpenCL device. Returns the default device."""
     process = run("devices --json")
@@ -131,8 +143,7 @@ def need_clang(tool):
     process = subprocess.run([ROOT / "tools/kernels" / tool, "--clang"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if process.returncode == 77:
         skip_all(process.stdout)
-    build = os.environ.get("BUILD", PROGRAM.parent)
-    subprocess.run([os.environ.get("MAKE", "make"), "-s", f"BUILD={build}", "kernel_text"], cwd=ROOT, check=True)
+    subprocess.run([os.environ.get("MAKE", "make"), "-s", f"BUILD={BUILD}", "kernel_text"], cwd=ROOT, check=True)
     return int(process.stdout)
 
 

@@ -2,7 +2,7 @@
 // image must be whole if one device is left, and the failure must be reported.
 // run_tests: sanitized
 #include "tests/check.h"
-#include "tests/failing/calls.h"
+#include "tests/failing/faults.h"
 #include "tests/failing/work.h"
 #include <pthread.h>
 #include <semaphore.h>
@@ -39,7 +39,6 @@ static void pair_dropped(void *context, size_t index)
 // Returns whether the image is whole. The computes are left open.
 static bool pair_work(Compute computes[2], WorkResult *result)
 {
-    call_counts_clear();
     memset(&pair, 0, sizeof pair);
     memset(result, 0, sizeof *result);
     sem_init(&pair.first_continues, 0, 0);
@@ -79,24 +78,18 @@ TEST(one_of_two_devices)
         "clEnqueueMapBuffer", "clGetEventInfo", "clEnqueueNDRangeKernel", "clWaitForEvents"};
     Compute computes[2];
     WorkResult result;
-    injected.in_threads = true;
-    injected.call = NULL;
-    injected.returns_null = false;
-    assert_true(pair_work(computes, &result));
-    assert_int_equal(pair.dropped_count, 0);
-    assert_memory_equal(result.colors, right.colors, sizeof right.colors);
-    pair_close(computes);
-    CallCount all[CALL_COUNTS];
-    memcpy(all, call_counts, sizeof all);
     for (size_t i = 0; i < COUNT_OF(needed); i++) {
-        size_t count = 0;
-        for (size_t k = 0; all[k].call; k++)
-            if (strcmp(all[k].call, needed[i]) == 0) count = all[k].count;
+        injected = (Fault){.call = needed[i], .is_in_threads = true, .act = FAULT_COUNT};
+        assert_true(pair_work(computes, &result));
+        assert_int_equal(pair.dropped_count, 0);
+        assert_memory_equal(result.colors, right.colors, sizeof right.colors);
+        pair_close(computes);
+        const size_t count = injected.count;
         assert_true(count > 0);
-        for (injected.index = 0; injected.index < count; injected.index++) {
-            injected.call = needed[i];
+        for (size_t k = 0; k < count; k++) {
+            injected = (Fault){.call = needed[i], .index = k, .is_in_threads = true, .act = FAULT_FAIL};
             bool whole = pair_work(computes, &result);
-            if (!whole) fail_msg("%s, call %zu: no image", needed[i], injected.index);
+            if (!whole) fail_msg("%s, call %zu: no image", needed[i], k);
             assert_int_equal(pair.dropped_count, 1);
             assert_int_equal(pair.dropped, 1);
             assert_int_equal(result.band_count, 2);
@@ -106,7 +99,6 @@ TEST(one_of_two_devices)
             pair_close(computes);
         }
     }
-    injected.in_threads = false;
     injected.call = NULL;
 }
 
@@ -115,8 +107,7 @@ TEST(a_device_without_a_thread)
 {
     Compute computes[2];
     WorkResult result;
-    injected.call = "pthread_create";
-    injected.index = EVERY_CALL;
+    injected = (Fault){.call = "pthread_create", .index = EVERY_CALL, .act = FAULT_FAIL};
     assert_true(pair_work(computes, &result));
     injected.call = NULL;
     assert_int_equal(pair.dropped_count, 1);
@@ -131,8 +122,7 @@ TEST(both_of_two_devices)
 {
     Compute computes[2];
     WorkResult result;
-    injected.call = "clEnqueueNDRangeKernel";
-    injected.index = EVERY_CALL;
+    injected = (Fault){.call = "clEnqueueNDRangeKernel", .index = EVERY_CALL, .act = FAULT_FAIL};
     assert_false(pair_work(computes, &result));
     assert_int_equal(pair.dropped_count, 1); // the last one reports for all
     assert_false(compute_ok(&computes[0]) || compute_ok(&computes[1]));

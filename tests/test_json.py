@@ -14,7 +14,7 @@ import sys
 import unittest
 
 import json_reference
-from glint import BALLS, PROGRAM, ROOT, TestCase, main, need_device, read, run, shim_build, write
+from glint import BALLS, PROGRAM, ROOT, TestCase, main, need_device, preloaded, read, run, shim_build, write
 
 WRITES = "--write" in sys.argv
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
@@ -165,9 +165,7 @@ class Json(TestCase):
         rest = f"{SMALL} {QUICK} --no-build-times --json"
         # at single a number of strong.yaml is beyond the range
         strong = [self.json(f"bench strong.yaml {rest} --variant '' --variant '--precision double'")] if fp64 else []
-        # the shim may come before the sanitizer, since it calls nothing before main
-        metered = {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c")),
-                   "ASAN_OPTIONS": f"{os.environ.get('ASAN_OPTIONS', '')}:verify_asan_link_order=0"}
+        metered = preloaded(shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c")))
         self.check_members("glint bench", self.compared(f"bench plain.yaml {rest} --samples 2,3 --compare bench.json"),
             self.json(f"bench plain.yaml {rest} --samples 2", env=metered),
             json.loads(bench.stdout),

@@ -14,19 +14,17 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
+from glint import BUILD, IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
 
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
               "OMPI_MCA_mpi_yield_when_idle": "1",  # ranks that wait leave the processor to other tests
               # more ranks than processors, in Open MPI 4 and in 5
               "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
-BUILD = os.environ.get("BUILD", "build")
 RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# Faults of a rank. Its device fails, is slow for a number of microseconds, or has so few bytes of memory, or it is interrupted as
-# it reads a scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
+# Faults of a rank. Its device has so few bytes of memory, or it is interrupted as it reads a scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
 # without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
@@ -37,12 +35,6 @@ FAULTS = """
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
-{
-    if (!getenv("FAULT_USEC")) return -5;
-    usleep(atoi(getenv("FAULT_USEC")));
-    return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
-}
 int clGetDeviceInfo(void *device, unsigned name, size_t size, void *value, size_t *value_size)
 {
     const int status = ((int (*)())dlsym(RTLD_NEXT, "clGetDeviceInfo"))(device, name, size, value, value_size);
@@ -94,7 +86,14 @@ FAULTY = [
 if IS_LONG:
     FAULTY += [wrong_word(TAKE, 0, 8, 4), wrong_word(BAND, 1, 1), wrong_word(BAND, 6, 0xFF), wrong_word(TAKE, 0, 0), wrong_word(BAND, 0, 65), wrong_word(BAND, 2, 0xFFFFFFFF), wrong_word(BAND, 4, 8),
                {"FAULT_TAG": BAND, "FAULT_TIMES": 2}, {"FAULT_TAG": BAND, "FAULT_TIMES": 0}, {"FAULT_TAG": LAYERS, "FAULT_TIMES": 2}]
-SLOW = {"FAULT_USEC": 200000}  # so that the other rank gets rows
+SLOW = {"GLINT_FAULTS": "'clEnqueueNDRangeKernel sleep=200'"}  # so that the other rank gets rows
+FAILING = {"GLINT_FAULTS": "'clEnqueueNDRangeKernel fail'"}
+
+
+def faulty(variables):
+    """Returns the start of a command of a rank with these faults."""
+    texts = " ".join(f"{name}={value}" for name, value in variables.items())
+    return f"env LD_PRELOAD='{BUILD.resolve()}/tests/faults.so ./ranks.so' {texts} {RANKS}"
 
 
 def environment():
@@ -160,7 +159,7 @@ class Mpi(TestCase):
 
     def faults_build(self):
         flags = subprocess.run(["pkg-config", "--cflags", "ompi-c"], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
-        shim_build("faults.so", FAULTS, *flags)
+        shim_build("ranks.so", FAULTS, *flags)
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
     def write_frames(self, more=(), status=0):
@@ -253,7 +252,7 @@ class Mpi(TestCase):
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
-        ranks = [f"env LD_PRELOAD=./faults.so {slow} {RANKS} {command} -o frames" for slow in ("FAULT_USEC=200000", "")]
+        ranks = [f"{faulty(fault)} {command} -o frames" for fault in (SLOW, FAILING)]
         for first, second in ranks, reversed(ranks):
             process = self.mpirun_each(first, second)
             self.assertRegex(process.stderr, "warning: clEnqueueNDRangeKernel.*; the other devices render its share")
@@ -268,7 +267,7 @@ class Mpi(TestCase):
         command = self.write_frames({"large": SPHERE + 4000 * SPHERE.splitlines(keepends=True)[-1]}.items())
         os.remove("expected/large.png")
         os.mkdir("frames")
-        small = f"env LD_PRELOAD=./faults.so FAULT_USEC=0 FAULT_MEMORY=131072 {RANKS} {command} -o frames"
+        small = f"{faulty({'FAULT_MEMORY': 131072})} {command} -o frames"
         process = self.mpirun(f"-n 2 {small}", 1)
         self.assertRegex(process.stderr, "the scene needs .* on the device")
         self.check_frames()
@@ -278,18 +277,14 @@ class Mpi(TestCase):
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
-        interrupted = f"env LD_PRELOAD=./faults.so FAULT_USEC=0 FAULT_INTERRUPTS=1 {RANKS} {command} -o frames"
+        interrupted = f"{faulty({'FAULT_INTERRUPTS': 1})} {command} -o frames"
         process = self.mpirun_each(interrupted, f"{RANKS} {command} -o frames", status=130)
         self.assertRegex(process.stderr, "glint: interrupted: no image was written; an earlier frames/")
         self.assertEqual([name for name in os.listdir("frames") if not name.endswith(".png")], [])
 
     def mpirun_faulty(self, *faults, status=0):
         """Runs a job in which each rank has the faults of its variables."""
-        commands = []
-        for fault in faults:
-            shim = f"env LD_PRELOAD=./faults.so {' '.join(f'{name}={value}' for name, value in fault.items())}"
-            commands.append(f"{shim} {RANKS} {RENDER} -o ranks.npy")
-        process = self.mpirun_each(*commands, status=status)
+        process = self.mpirun_each(*(f"{faulty(fault)} {RENDER} -o ranks.npy" for fault in faults), status=status)
         if status == 0:
             self.assertSameBytes("one.npy", "ranks.npy")
             os.remove("ranks.npy")
@@ -299,16 +294,16 @@ class Mpi(TestCase):
     def test_failing_devices(self):
         """The other ranks render the rows of a rank whose device fails. If no rank is left, the job exits with status 2."""
         self.faults_build()
-        self.assertRegex(self.mpirun_faulty(SLOW, {}), "warning: rank 1 on .*: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES.*; the other ranks render its rows")
-        self.assertRegex(self.mpirun_faulty({}, SLOW), "warning: clEnqueueNDRangeKernel.*; the other devices render its share")
-        self.assertRegex(self.mpirun_faulty({}, {}, status=2), "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+        self.assertRegex(self.mpirun_faulty(SLOW, FAILING), "warning: rank 1 on .*: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES.*; the other ranks render its rows")
+        self.assertRegex(self.mpirun_faulty(FAILING, SLOW), "warning: clEnqueueNDRangeKernel.*; the other devices render its share")
+        self.assertRegex(self.mpirun_faulty(FAILING, FAILING, status=2), "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
 
     def test_nonsense(self):
         """Everything that a rank sends is checked."""
         self.faults_build()
         for fault in FAULTY:
             with self.subTest(fault=fault):
-                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: sent an unexpected message; the other ranks")
+                self.assertRegex(self.mpirun_faulty(SLOW, fault), "warning: rank 1 on .*: sent an unexpected message; the other ranks")
 
     def start(self, command, patience=1):
         """Starts a job with a checkpoint, whose ranks write their errors to `errors`, since an interrupted mpirun of Open MPI 5

@@ -4,16 +4,14 @@
 // run_tests: sanitized
 #include "tests/check.h"
 #include "tests/failing/calls.h"
+#include "tests/failing/faults.h"
 #include "tests/failing/work.h"
 #include "tests/film.h"
 
 // Fails a call. It must be reported if `is_needed`, else the work is done without it.
 static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)
 {
-    injected.call = call;
-    injected.index = index;
-    injected.returns_null = returns_null;
-    call_counts_clear();
+    injected = (Fault){.call = call, .index = index, .act = returns_null ? FAULT_NULL : FAULT_FAIL};
     Compute compute;
     WorkResult result;
     bool done = work(&compute, &result);
@@ -33,8 +31,7 @@ static void call_fail(const char *call, size_t index, bool returns_null, bool is
 // Fails calls of a function in turn: each, or about `most` of them in a short test, and the last.
 static void some_calls_fail(const char *call, size_t most, bool returns_null, bool is_needed)
 {
-    assert_work_is_right();
-    const size_t count = call_count(call)->count;
+    const size_t count = assert_work_is_right(call);
     if (count == 0) fail_msg("%s is never called", call);
     const size_t step = tests_are_long() || count <= most ? 1 : count / most;
     for (size_t i = 0; i + 1 < count; i += step)
@@ -57,19 +54,18 @@ TEST(needed_calls)
         calls_fail(needed[i], false, true);
     // only buffers in the host's memory need it
     if (work_device->type & CL_DEVICE_TYPE_CPU) calls_fail("clSetMemObjectDestructorCallback", false, true);
-    assert_work_is_right();
+    assert_work_is_right(NULL);
 }
 
 // Unmaps are needed where a launch follows. The last two, those of the trace, come after all results.
 TEST(unmaps)
 {
     static const char call[] = "clEnqueueUnmapMemObject";
-    assert_work_is_right();
-    size_t count = call_count(call)->count;
+    const size_t count = assert_work_is_right(call);
     assert_true(count > 2);
     for (size_t i = 0; i < count; i++)
         call_fail(call, i, false, i + 2 < count);
-    assert_work_is_right();
+    assert_work_is_right(NULL);
 }
 
 TEST(needed_objects)
@@ -78,7 +74,7 @@ TEST(needed_objects)
                                            "clEnqueueMapBuffer"};
     for (size_t i = 0; i < COUNT_OF(creating); i++)
         calls_fail(creating[i], true, true);
-    assert_work_is_right();
+    assert_work_is_right(NULL);
 }
 
 // Times, a kernel's limit of work-items, a binary for the cache, and releases.
@@ -90,7 +86,7 @@ TEST(dispensable_calls)
         "clReleaseCommandQueue",   "clGetKernelInfo",          "clGetProgramBuildInfo", "clGetMemObjectInfo"};
     for (size_t i = 0; i < COUNT_OF(dispensable); i++)
         call_fail(dispensable[i], EVERY_CALL, false, false);
-    assert_work_is_right();
+    assert_work_is_right(NULL);
 }
 
 // A message about a build without a log states so, and names the disk if it is full.
@@ -98,8 +94,7 @@ TEST(empty_build_log)
 {
     for (int full = 0; full < 2; full++) {
         disk_is_full = full == 1;
-        injected.call = "clBuildProgram";
-        injected.index = EVERY_CALL;
+        injected = (Fault){.call = "clBuildProgram", .index = EVERY_CALL, .act = FAULT_FAIL};
         Compute compute;
         WorkResult result;
         assert_false(work(&compute, &result));
@@ -109,7 +104,7 @@ TEST(empty_build_log)
         compute_close_checked(&compute);
     }
     disk_is_full = false;
-    assert_work_is_right();
+    assert_work_is_right(NULL);
 }
 
 // A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
@@ -130,7 +125,7 @@ TEST(builds)
     call_fail("clCreateKernel", EVERY_CALL, true, true);
     call_fail("clBuildProgram", 0, false, false); // built once more, despite PoCL's cache
     call_fail("clBuildProgram", EVERY_CALL, false, true);
-    assert_work_is_right();
+    assert_work_is_right(NULL);
     if (cache[0] != '\0')
         setenv("XDG_CACHE_HOME", cache, 1);
     else
@@ -141,7 +136,6 @@ TEST(builds)
 // device is left.
 static void devices_discover(const char *failed_call)
 {
-    call_counts_clear();
     DeviceList list;
     OwnedMessageList messages = {0};
     device_list_open(&list, NULL);
@@ -159,12 +153,13 @@ TEST(discovery)
     static const char *const queries[] = {"clGetPlatformIDs", "clGetPlatformInfo", "clGetDeviceIDs",
                                           "clGetDeviceInfo"};
     for (size_t i = 0; i < COUNT_OF(queries); i++) {
-        injected.call = NULL;
+        injected = (Fault){.call = queries[i], .act = FAULT_COUNT};
         devices_discover(NULL);
-        const size_t count = call_count(queries[i])->count;
-        injected.call = queries[i];
-        for (injected.index = 0; injected.index < count; injected.index++)
+        const size_t count = injected.count;
+        for (size_t k = 0; k < count; k++) {
+            injected = (Fault){.call = queries[i], .index = k, .act = FAULT_FAIL};
             devices_discover(queries[i]);
+        }
     }
     injected.call = NULL;
 }
@@ -176,10 +171,8 @@ TEST(unknown_memory)
     Device unknown = *work_device;
     unknown.memory_bytes = unknown.largest_buffer_bytes = 0;
     work_device = &unknown;
-    assert_work_is_right();
-    injected.call = "clCreateBuffer";
-    injected.index = 0;
-    call_counts_clear();
+    assert_work_is_right(NULL);
+    injected = (Fault){.call = "clCreateBuffer", .act = FAULT_FAIL};
     Compute compute;
     WorkResult result;
     assert_false(work(&compute, &result));

@@ -13,22 +13,12 @@ import tarfile
 import time
 import unittest
 
-from glint import IS_SANITIZED, PROGRAM, TestCase, main, need_device, shim_build
+from glint import IS_SANITIZED, PROGRAM, TestCase, faults, main, need_device
 
 need_device()
 SMALL = "report S1 --precision single --lanes 1 -o r.tar.gz"
 STEPS = ["devices", "passports", "verify", "bench"]
-# The driver fails in clBuildProgram, by a crash or by not returning.
-SHIM = """
-#include <stdlib.h>
-#include <unistd.h>
-int clBuildProgram(void)
-{
-    if (getenv("HANGS")) for (;;) pause();
-    *(volatile int *)NULL = 0;
-    return 0;
-}
-"""
+CRASHES, HANGS = faults("clBuildProgram crash"), faults("clBuildProgram hang")
 
 
 class Report(TestCase):
@@ -99,21 +89,19 @@ class Report(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
     def test_crashes_and_hangs(self):
-        shim = {"LD_PRELOAD": shim_build("shim.so", SHIM)}
-        _, files = self.report(**shim)
+        _, files = self.report(**CRASHES)
         self.assertEqual([step for step, _ in self.failures(files)], STEPS[1:])
         self.assertIn("clBuildProgram", files["passports.log"])
         self.assertTrue(any(name.endswith(".cl") and name[:-2] + "log" not in files for name in files))
-        _, files = self.report(f"{SMALL} --seconds 1", **shim, HANGS="1")
+        _, files = self.report(f"{SMALL} --seconds 1", **HANGS)
         # on a busy machine the first step may take longer than a second
         failures = [(step, failure) for step, failure in self.failures(files) if step != STEPS[0]]
         self.assertEqual(failures, [(step, "stopped after 1 second") for step in STEPS[1:]])
 
     @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
     def test_interrupt(self):
-        shim = {"LD_PRELOAD": shim_build("shim.so", SHIM), "HANGS": "1"}
         command = [PROGRAM, *SMALL.split()]
-        with subprocess.Popen(command, env=os.environ | self.env | shim, stderr=subprocess.PIPE, text=True) as process:
+        with subprocess.Popen(command, env=os.environ | self.env | HANGS, stderr=subprocess.PIPE, text=True) as process:
             while not any(name.endswith("passports.log") for _, _, names in os.walk("temporary") for name in names):
                 time.sleep(0.01)
             process.send_signal(signal.SIGINT)

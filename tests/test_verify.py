@@ -9,55 +9,13 @@ import json
 import re
 import unittest
 
-from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, csv_rows, main, need_device, npy_read, read, run, shim_build, terminal_run, write
+from glint import IS_LONG, IS_SANITIZED, ROOT, SPHERE, TestCase, csv_rows, faults, main, need_device, npy_read, read, run, terminal_run, write
 
 DEVICE = need_device()
 TIERS = {"single": "B", "strict": "C", "double": "D"}
 PRECISIONS = [precision for precision in TIERS if precision != "double" or DEVICE["fp64"]]
 ALL_CASES = re.findall(r"\b[A-Z][1-9]\b", run("verify NONE").stderr)
 QUICK = "" if IS_LONG else "--quick"
-# The driver crashes in CRASHING_CALL for the kernel `path`.
-CRASHING = """
-#define _GNU_SOURCE
-#include <CL/cl.h>
-#include <dlfcn.h>
-#include <stdlib.h>
-#include <string.h>
-
-static void crash_if(const char *call, const char *name)
-{
-    if (strcmp(getenv("CRASHING_CALL"), call) == 0 && strcmp(name, "path") == 0) *(volatile int *)NULL = 0;
-}
-
-cl_kernel clCreateKernel(cl_program program, const char *name, cl_int *status)
-{
-    crash_if("clCreateKernel", name);
-    return ((cl_kernel (*)(cl_program, const char *, cl_int *))dlsym(RTLD_NEXT, "clCreateKernel"))(program, name, status);
-}
-
-cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t *first,
-                              const size_t *items, const size_t *group, cl_uint count, const cl_event *events, cl_event *event)
-{
-    char name[64] = "";
-    clGetKernelInfo(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
-    crash_if("clEnqueueNDRangeKernel", name);
-    return ((cl_int (*)(cl_command_queue, cl_kernel, cl_uint, const size_t *, const size_t *, const size_t *, cl_uint,
-                        const cl_event *, cl_event *))dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(
-        queue, kernel, dimensions, first, items, group, count, events, event);
-}
-"""
-# The driver ends the process with STATUS, or by a signal without one, before the first case.
-ENDING = """
-#include <signal.h>
-#include <stdlib.h>
-
-void clCreateContext(void)
-{
-    const char *status = getenv("STATUS");
-    if (status) exit(atoi(status));
-    raise(SIGKILL);
-}
-"""
 DEVICE_FUNCTIONS = (
     "sqrt|rsqrt|pow|powr|pown|exp|exp2|log|log2|native_[a-z0-9]*|half_[a-z]+|normalize|length|distance|sin|cos|tan|acos|"
     "atan2?|hypot|mad|mix|smoothstep|dot|cross|fmod"
@@ -133,9 +91,8 @@ class Verify(VerifyTestCase):
         """If the driver crashes while it builds or runs one kernel, the other cases keep their bits."""
         cases = ["S2", "S5", "P4"]
         whole = self.verify(cases, "--precision single --quick")["cases"]
-        env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
         for call in "clCreateKernel", "clEnqueueNDRangeKernel":
-            env["CRASHING_CALL"] = call
+            env = faults(f"{call} kernel=path crash")
             with self.subTest(call):
                 process = run(f"verify {' '.join(cases)} --precision single --quick --json", env=env)
                 self.assertEqual((process.returncode, process.stderr), (3, ""))
@@ -154,9 +111,8 @@ class Verify(VerifyTestCase):
     @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
     def test_an_end_between_cases(self):
         """Whatever the status of a process that ends before its cases, they have not passed, and the reason is printed."""
-        shim = shim_build("ending.so", ENDING)
-        for env, reason in ({"STATUS": "0"}, "ended with status 0"), ({"STATUS": "1"}, "ended with status 1"), ({}, "ended by a signal: Killed"):
-            self.refuses("verify S1 --precision single", rf"\Aglint: the process (was )?{reason}\n\Z", 2, env={"LD_PRELOAD": shim} | env)
+        for act, reason in ("exit=0", "ended with status 0"), ("exit=1", "ended with status 1"), ("kill", "ended by a signal: Killed"):
+            self.refuses("verify S1 --precision single", rf"\Aglint: the process (was )?{reason}\n\Z", 2, env=faults(f"clCreateContext {act}"))
 
     def test_progress(self):
         """Progress on a terminal names the case and the number of cases."""

@@ -11,7 +11,7 @@ import shutil
 import signal
 from pathlib import Path
 
-from glint import IS_LONG, ROOT, TestCase, main, need_device, npy_read, png_read, read, run, shim_build, skip_all, write
+from glint import IS_LONG, ROOT, TestCase, faults, main, need_device, npy_read, png_read, read, run, shim_build, skip_all, write
 from window import DEADLINE, HEIGHT, SAMPLES, SCENE, WIDTH, Window, display_open, png_rows, screen, wait_until, windows_shown, xdotool
 
 FRAMES = 8
@@ -282,7 +282,7 @@ class View(TestCase):
 
     def test_failing_device(self):
         """A failing device's message is shown, and the window stays. The next movement retries."""
-        window = Window(self, LD_PRELOAD=self.failing_calls())
+        window = Window(self, **faults("clEnqueueNDRangeKernel file=fails:0 fail"))
         window.saved()
         write("fails", "")
         for key in "Left", "Up", "r", "r":

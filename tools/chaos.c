@@ -1,23 +1,19 @@
-// Makes one or more calls of a process fail, and counts calls. tools/chaos preloads this library into glint.
+// Makes allocations and system calls of a process fail by the rules of tests/failing/faults.h. tools/chaos
+// preloads this library into glint, with tests/failing/calls.c for OpenCL's calls.
 //
-// GLINT_CHAOS selects what fails. Calls are counted from 0:
-//   cl N      OpenCL call N of glint
-//   null N    OpenCL call N of those that create an object, which returns NULL with CL_SUCCESS
-//   alloc N   allocation N of glint's own code
-//   call N    system call N on a file below the folder GLINT_CHAOS_FOLDER, or on stdin and stdout, with EIO
-//   eintr N   system call N, counted like those of `call`, with EINTR
-//   full N    the system calls of `call` from N on that write or create, with ENOSPC
-//   short     reads and writes among the system calls of `call` transfer half of the requested bytes
-//   deny N    every system call whose number is N, with EPERM
-//   (else)    nothing
-//   child …   makes the call fail in this process's children, but not in this process
-// GLINT_CHAOS_LOG names a file that receives "failed NAME" when a call is made to fail, and the number of
-// calls of each kind when the process ends.
+//   allocation   an allocation by glint's own code
+//   file         a system call on a file below the folder GLINT_CHAOS_FOLDER, or on stdin and stdout. It
+//   fails
+//                with EIO, at `full` with ENOSPC if it writes or creates, at `interrupt` with EINTR; `short`
+//                is for reads and writes
+//
+// GLINT_DENIED is the number of a system call that always fails with EPERM.
 //
 // seccomp traps the system calls, including those within libc. Works only on x86-64 Linux with glibc.
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
+#include "tests/failing/faults.h"
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,7 +24,6 @@
 #include <linux/seccomp.h>
 #include <signal.h>
 #include <stdarg.h>
-#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -43,9 +38,7 @@
 // glibc's parameters have reserved names
 // NOLINTBEGIN(readability-inconsistent-declaration-parameter-name)
 
-static char kind[16], folder[PATH_MAX], log_path[PATH_MAX];
-static unsigned long failing = ULONG_MAX;
-static atomic_ulong cl_count, null_count, alloc_count, call_count;
+static char folder[PATH_MAX];
 static uintptr_t text_start, text_end; // the bounds of the main program's code
 
 // Makes a system call that the filter lets pass.
@@ -56,34 +49,6 @@ __attribute__((naked, noinline)) static long pass_through(long number, long a, l
             "mov %r9, %r8\n mov 8(%rsp), %r9\n syscall\n ret\n");
 }
 enum { PASS_THROUGH_BYTES = 64 };
-
-static void log_line(const char *format, ...)
-{
-    char line[128];
-    va_list arguments;
-    va_start(arguments, format);
-    int length = vsnprintf(line, sizeof line, format, arguments);
-    va_end(arguments);
-    if (log_path[0] == '\0') return;
-    long file = pass_through(SYS_openat, AT_FDCWD, (long)log_path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC,
-                             0600, 0, 0);
-    if (file < 0) return;
-    pass_through(SYS_write, file, (long)line, length, 0, 0, 0);
-    pass_through(SYS_close, file, 0, 0, 0, 0, 0);
-}
-
-static bool is_kind(const char *name)
-{
-    return strcmp(kind, name) == 0;
-}
-
-// Counts a call and returns whether it must fail.
-static bool count_fails(const char *of, atomic_ulong *count, const char *name)
-{
-    bool fails = atomic_fetch_add(count, 1) == failing && is_kind(of);
-    if (fails) log_line("failed %s\n", name);
-    return fails;
-}
 
 static void *real(const char *name)
 {
@@ -97,72 +62,6 @@ typedef long (*Function)(long, long, long, long, long, long, long, long, long, l
 #define PARAMETERS long a, long b, long c, long d, long e, long f, long g, long h, long i, long j, long k
 #define ARGUMENTS  a, b, c, d, e, f, g, h, i, j, k
 
-// ---- OpenCL
-
-enum { CL_OUT_OF_RESOURCES = -5 };
-
-// Calls an OpenCL function or makes it fail. `status` points to its error code, or is NULL if it returns
-// that.
-static long cl_call(const char *name, long *status, bool is_release, Function function, PARAMETERS)
-{
-    if (status && count_fails("null", &null_count, name)) {
-        *(int *)status = 0;
-        return 0;
-    }
-    bool fails = count_fails("cl", &cl_count, name);
-    if (is_release || !fails) {
-        long result = function(ARGUMENTS);
-        return fails ? CL_OUT_OF_RESOURCES : result;
-    }
-    if (!status) return CL_OUT_OF_RESOURCES;
-    *(int *)status = CL_OUT_OF_RESOURCES;
-    return 0;
-}
-
-#define CL(name, status, is_release)                                                                         \
-    long name(PARAMETERS)                                                                                    \
-    {                                                                                                        \
-        static Function function;                                                                            \
-        if (!function) function = (Function)real(#name);                                                     \
-        return cl_call(#name, (long *)(status), is_release, function, ARGUMENTS);                            \
-    }
-#define STATUS(name)         CL(name, 0, false)
-#define RELEASE(name)        CL(name, 0, true)
-#define CREATE(name, status) CL(name, status, false)
-
-STATUS(clGetPlatformIDs)
-STATUS(clGetPlatformInfo)
-STATUS(clGetDeviceIDs)
-STATUS(clGetDeviceInfo)
-STATUS(clGetKernelWorkGroupInfo)
-CREATE(clCreateContext, f)
-CREATE(clCreateCommandQueue, d)
-CREATE(clCreateProgramWithSource, e)
-CREATE(clCreateProgramWithBinary, g)
-CREATE(clCreateKernel, c)
-CREATE(clCreateBuffer, e)
-CREATE(clEnqueueMapBuffer, j)
-RELEASE(clReleaseContext)
-RELEASE(clReleaseCommandQueue)
-RELEASE(clReleaseMemObject)
-RELEASE(clReleaseProgram)
-RELEASE(clReleaseKernel)
-RELEASE(clReleaseEvent)
-RELEASE(clEnqueueUnmapMemObject)
-STATUS(clSetMemObjectDestructorCallback)
-STATUS(clBuildProgram)
-STATUS(clGetProgramBuildInfo)
-STATUS(clGetProgramInfo)
-STATUS(clGetKernelInfo)
-STATUS(clSetKernelArg)
-STATUS(clEnqueueNDRangeKernel)
-STATUS(clEnqueueReadBuffer)
-STATUS(clEnqueueWriteBuffer)
-STATUS(clFinish)
-STATUS(clWaitForEvents)
-STATUS(clGetEventInfo)
-STATUS(clGetEventProfilingInfo)
-
 // ---- allocations by the main program
 
 void *__libc_malloc(size_t size);
@@ -174,7 +73,7 @@ void *__libc_memalign(size_t alignment, size_t size);
     ((uintptr_t)__builtin_return_address(0) >= text_start &&                                                 \
      (uintptr_t)__builtin_return_address(0) < text_end)
 #define ALLOCATION_FAILS(name)                                                                               \
-    (IS_GLINT && count_fails("alloc", &alloc_count, name) ? (errno = ENOMEM, true) : false)
+    (IS_GLINT && fault_at(name, CALL_ALLOCATION, NULL) ? (errno = ENOMEM, true) : false)
 
 void *malloc(size_t size)
 {
@@ -294,17 +193,16 @@ static long call_make(size_t n, const long *a)
                                         : descriptor_is_ours(a[what & TO_FOLDER ? 2 : 0]);
     if (!ours) return pass_through(number, a[0], a[1], a[2], a[3], a[4], a[5]);
     long size = a[2];
-    if (is_kind("short") && (what & (READS | WRITES)) && size > 1) size = (size + 1) / 2;
-    unsigned long index = atomic_fetch_add(&call_count, 1);
-    bool is_it = index == failing;
+    const FaultAct act = fault_at(trapped[n].name, CALL_FILE, NULL);
+    if (act == FAULT_SHORT && (what & (READS | WRITES)) && size > 1) size = (size + 1) / 2;
     bool grows =
         (what & (WRITES | STORES)) || ((what & CREATES) && (a[2] & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY))));
-    int error = is_kind("call") && is_it                       ? EIO
-                : is_kind("eintr") && is_it                    ? EINTR
-                : is_kind("full") && index >= failing && grows ? ENOSPC
-                                                               : 0;
+    int error = act == FAULT_FAIL            ? EIO
+                : act == FAULT_INTERRUPT     ? EINTR
+                : act == FAULT_FULL && grows ? ENOSPC
+                                             : 0;
     if (!error) return pass_through(number, a[0], a[1], size, a[3], a[4], a[5]);
-    log_line("failed %s\n", trapped[n].name);
+    if (act == FAULT_FULL) faults_log_failed(trapped[n].name);
     return -error;
 }
 
@@ -340,7 +238,7 @@ static void filter_install(struct sock_filter *filter, unsigned short count)
     const struct sock_fprog program = {.len = count, .filter = filter};
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) != 0)
-        log_line("failed seccomp\n");
+        faults_log_failed("seccomp");
 }
 
 static void trap_calls(void)
@@ -398,38 +296,20 @@ static int find_text(struct dl_phdr_info *info, size_t size, void *unused)
 
 __attribute__((constructor)) static void start(void)
 {
-    const char *what = getenv("GLINT_CHAOS"), *where = getenv("GLINT_CHAOS_FOLDER"),
-               *log = getenv("GLINT_CHAOS_LOG");
-    static const char child[] = "child ";
-    if (what && strncmp(what, child, strlen(child)) == 0) {
-        setenv("GLINT_CHAOS", what + strlen(child), 1);
-        return;
-    }
+    const char *where = getenv("GLINT_CHAOS_FOLDER"), *denied = getenv("GLINT_DENIED");
+    if (faults_are_for_children) return;
     if (where) snprintf(folder, sizeof folder, "%s", where);
-    if (log) snprintf(log_path, sizeof log_path, "%s", log);
-    const char *space = what ? strchr(what, ' ') : NULL;
-    if (what) snprintf(kind, sizeof kind, "%.*s", (int)strcspn(what, " "), what);
-    if (space) failing = strtoul(space, NULL, 10);
     dl_iterate_phdr(find_text, NULL);
     // the filter would kill programs that a driver starts before they could handle the signal
     unsetenv("LD_PRELOAD");
-    if (is_kind("call") || is_kind("eintr") || is_kind("full") || is_kind("short") || is_kind("count"))
-        trap_calls();
-    if (is_kind("deny")) deny_call((unsigned)failing);
-}
-
-__attribute__((destructor)) static void end(void)
-{
-    log_line("cl %lu\n", cl_count);
-    log_line("null %lu\n", null_count);
-    log_line("alloc %lu\n", alloc_count);
-    log_line("call %lu\n", call_count);
+    if (faults_concern(CALL_FILE)) trap_calls();
+    if (denied) deny_call((unsigned)strtoul(denied, NULL, 10));
 }
 
 // Replaces _exit, by which the process that reads a mesh for another one ends.
 void _exit(int status)
 {
-    end();
+    faults_log_counts();
     for (;;)
         pass_through(SYS_exit_group, status, 0, 0, 0, 0, 0);
 }

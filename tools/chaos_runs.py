@@ -20,7 +20,7 @@ STATUSES = {0, 1, 2, 3, 4, 130}
 class Command:
     """A command line of glint, the files that it writes, and its results without failures."""
 
-    def __init__(self, line, *outputs, fault_types=("cl", "null", "alloc", "call"), is_slow=False, within=""):
+    def __init__(self, line, *outputs, fault_types=("opencl", "creating", "allocation", "file"), is_slow=False, within=""):
         self.line, self.outputs, self.fault_types, self.is_slow = line, outputs, fault_types, is_slow
         self.within = within  # "child " makes calls fail in child processes only
         self.is_resumable = "--checkpoint" in line  # resumes after a failure
@@ -62,11 +62,11 @@ class Runner:
             (self.work / name).write_bytes(content if isinstance(content, bytes) else content.encode())
         self.inputs = set(files) | {"cache"}
 
-    def start(self, line, fault=None, limit=None):
+    def start(self, line, fault=None, limit=None, denied=None):
         settings = dict(self.environment)
-        if fault:
-            settings |= {"LD_PRELOAD": str(self.shim), "GLINT_CHAOS": fault, "GLINT_CHAOS_LOG": str(self.log),
-                         "GLINT_CHAOS_FOLDER": str(self.work)}
+        if fault or denied:
+            settings |= {"LD_PRELOAD": str(self.shim), "GLINT_FAULT_LOG": str(self.log), "GLINT_CHAOS_FOLDER": str(self.work)}
+            settings |= {"GLINT_FAULTS": fault} if fault else {"GLINT_DENIED": str(denied)}
         program = self.options.glint + ("-view" if line.startswith("view") else "")
         return subprocess.Popen([program, *shlex.split(line)], cwd=self.work, env=settings, text=True,
                                 errors="replace", stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -143,13 +143,13 @@ class Runner:
             shutil.rmtree(cache, ignore_errors=True)
             cache.mkdir()
 
-    def attempt(self, command, fault=None, limit=None):
+    def attempt(self, command, fault=None, limit=None, denied=None):
         self.log.unlink(missing_ok=True)
         for name in command.outputs:
             (self.work / name).write_bytes(OLD)
-        status, errors = self.finish(self.start(command.line, fault, limit))
+        status, errors = self.finish(self.start(command.line, fault, limit, denied))
         self.test.tries += 1
-        cause = f"GLINT_CHAOS={fault!r}" if fault else f"setrlimit{limit}" if limit else None
+        cause = f"GLINT_FAULTS={fault!r}" if fault else f"setrlimit{limit}" if limit else f"GLINT_DENIED={denied}" if denied else None
         self.check_end(command, status, errors, cause)
         if command.is_resumable and (status != command.status or errors):
             status, errors = self.resume(command, cause)
@@ -165,7 +165,7 @@ class Runner:
 
     def learn(self, command):
         """Records what the command does when nothing fails, and how many calls it makes."""
-        counting = "count" if "call" in command.fault_types else "none"
+        counting = "; ".join(f"{fault_type} count" for fault_type in command.fault_types)
         for _ in range(3):  # timings may choose a size for which the driver has not compiled a kernel
             for fault in None, command.within + counting:  # the first run fills the caches
                 self.log.unlink(missing_ok=True)

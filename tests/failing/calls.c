@@ -1,96 +1,66 @@
+// Makes OpenCL calls fail by the rules of faults.h. In C tests the linker puts these functions in the place
+// of those that glint calls (ld --wrap, see the Makefile), and an OpenCL call without one does not link.
+// Where PRELOADED is defined, they have OpenCL's names.
+#define CL_TARGET_OPENCL_VERSION 120
 #include "tests/failing/calls.h"
-#include "host/opencl/device.h"
-#include <assert.h>
-#include <errno.h>
-#include <signal.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/statvfs.h>
+#include "tests/failing/faults.h"
+#include <CL/cl.h>
+#include <dlfcn.h>
 
-InjectedFailure injected;
-pthread_t first_thread;
-bool first_is_tiny, disk_is_full;
 atomic_long live_count;
-CallCount call_counts[CALL_COUNTS];
 
-static pthread_mutex_t counts_mutex = PTHREAD_MUTEX_INITIALIZER;
-
-void call_counts_clear(void)
-{
-    memset(call_counts, 0, sizeof call_counts);
-}
-
-CallCount *call_count(const char *call)
-{
-    CallCount *count = call_counts;
-    while (count->call && strcmp(count->call, call) != 0)
-        count++;
-    count->call = call;
-    return count;
-}
-
-static bool call_fails(const char *call)
-{
-    if (injected.in_threads && pthread_equal(pthread_self(), first_thread)) return false;
-    pthread_mutex_lock(&counts_mutex);
-    size_t index = call_count(call)->count++;
-    pthread_mutex_unlock(&counts_mutex);
-    bool fails = injected.call && strcmp(injected.call, call) == 0 &&
-                 (injected.index == index || injected.index == EVERY_CALL);
-    if (fails && injected.crash == SIGABRT) abort();
-    if (fails && injected.crash == FAILED_ASSERTION) {
-        signal(SIGABRT, SIG_DFL); // as LLVM leaves it
-        __assert_fail("lib != NULL", "driver.cc", 1, "getKernelLibrary");
-    }
-    while (fails && injected.crash) // as a wrong access would again; LLVM's handler only resets the signal's
-        raise(injected.crash);
-    return fails;
-}
+#ifdef PRELOADED
+#define DEFINED(name) name
+#define REAL(name)    ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
+#define DECLARE(name)
+#else
+#define DEFINED(name) __wrap_##name
+#define REAL(name)    __real_##name
+#define DECLARE(name) __typeof__(name) __wrap_##name, __real_##name;
+#endif
 
 // Defines a call that returns a status. It is not made where it fails.
-#define STATUS(name, parameters, arguments)                                                                  \
-    cl_int __real_##name parameters;                                                                         \
-    cl_int __wrap_##name parameters;                                                                         \
-    cl_int __wrap_##name parameters                                                                          \
+#define STATUS(name, parameters, arguments) STATUS_OF(name, NULL, parameters, arguments)
+#define STATUS_OF(name, kernel, parameters, arguments)                                                       \
+    DECLARE(name)                                                                                            \
+    cl_int DEFINED(name) parameters                                                                          \
     {                                                                                                        \
-        return call_fails(#name) ? CL_OUT_OF_RESOURCES : __real_##name arguments;                            \
+        return fault_at(#name, CALL_OPENCL, kernel) ? CL_OUT_OF_RESOURCES : REAL(name) arguments;            \
     }
 
 // Defines a call that releases. It is made even where it fails, so that nothing is left in the driver.
 #define RELEASE(name, parameters, arguments)                                                                 \
-    cl_int __real_##name parameters;                                                                         \
-    cl_int __wrap_##name parameters;                                                                         \
-    cl_int __wrap_##name parameters                                                                          \
+    DECLARE(name)                                                                                            \
+    cl_int DEFINED(name) parameters                                                                          \
     {                                                                                                        \
         live_count--;                                                                                        \
-        cl_int released = __real_##name arguments;                                                           \
-        return call_fails(#name) ? CL_OUT_OF_RESOURCES : released;                                           \
+        cl_int released = REAL(name) arguments;                                                              \
+        return fault_at(#name, CALL_OPENCL, NULL) ? CL_OUT_OF_RESOURCES : released;                          \
     }
 
-#define CREATE(type, name, parameters, arguments)                                                            \
-    type __real_##name parameters;                                                                           \
-    type __wrap_##name parameters;                                                                           \
-    type __wrap_##name parameters                                                                            \
+#define CREATE(type, name, parameters, arguments) CREATE_OF(type, name, NULL, parameters, arguments)
+#define CREATE_OF(type, name, kernel, parameters, arguments)                                                 \
+    DECLARE(name)                                                                                            \
+    type DEFINED(name) parameters                                                                            \
     {                                                                                                        \
-        if (call_fails(#name)) {                                                                             \
-            *status = injected.returns_null ? CL_SUCCESS : CL_OUT_OF_RESOURCES;                              \
+        const FaultAct act = fault_at(#name, CALL_OPENCL | CALL_CREATING, kernel);                           \
+        if (act) {                                                                                           \
+            *status = act == FAULT_NULL ? CL_SUCCESS : CL_OUT_OF_RESOURCES;                                  \
             return NULL;                                                                                     \
         }                                                                                                    \
-        type object = __real_##name arguments;                                                               \
+        type object = REAL(name) arguments;                                                                  \
         live_count += object != NULL;                                                                        \
         return object;                                                                                       \
     }
 
-cl_int __real_clGetDeviceInfo(cl_device_id, cl_device_info, size_t, void *, size_t *);
-cl_int __wrap_clGetDeviceInfo(cl_device_id, cl_device_info, size_t, void *, size_t *);
-cl_int __wrap_clGetDeviceInfo(cl_device_id id, cl_device_info what, size_t size, void *value, size_t *needed)
+DECLARE(clGetKernelInfo)
+
+// Returns a kernel's name, valid until the thread's next call.
+static const char *name_of(cl_kernel kernel)
 {
-    static cl_device_id first;
-    if (call_fails("clGetDeviceInfo")) return CL_OUT_OF_RESOURCES;
-    const cl_int status = __real_clGetDeviceInfo(id, what, size, value, needed);
-    if (!first) first = id;
-    if (first_is_tiny && id == first && what == CL_DEVICE_MAX_MEM_ALLOC_SIZE) *(cl_ulong *)value = 1;
-    return status;
+    static _Thread_local char name[32];
+    const cl_int status = REAL(clGetKernelInfo)(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
+    return status == CL_SUCCESS ? name : "";
 }
 
 // A command whose event is requested creates one.
@@ -106,6 +76,8 @@ STATUS(clGetPlatformInfo, (cl_platform_id id, cl_platform_info what, size_t size
        (id, what, size, value, needed))
 STATUS(clGetDeviceIDs, (cl_platform_id id, cl_device_type type, cl_uint n, cl_device_id *ids, cl_uint *count),
        (id, type, n, ids, count))
+STATUS(clGetDeviceInfo, (cl_device_id id, cl_device_info what, size_t size, void *value, size_t *needed),
+       (id, what, size, value, needed))
 CREATE(cl_context, clCreateContext, (const cl_context_properties *properties, cl_uint n, const cl_device_id *ids,
        ContextNotify notify, void *data, cl_int *status), (properties, n, ids, notify, data, status))
 CREATE(cl_command_queue, clCreateCommandQueue, (cl_context context, cl_device_id id,
@@ -117,7 +89,8 @@ CREATE(cl_program, clCreateProgramWithSource, (cl_context context, cl_uint n, co
 CREATE(cl_program, clCreateProgramWithBinary, (cl_context context, cl_uint n, const cl_device_id *ids,
        const size_t *lengths, const unsigned char **binaries, cl_int *statuses, cl_int *status),
        (context, n, ids, lengths, binaries, statuses, status))
-CREATE(cl_kernel, clCreateKernel, (cl_program program, const char *name, cl_int *status), (program, name, status))
+CREATE_OF(cl_kernel, clCreateKernel, name, (cl_program program, const char *name, cl_int *status),
+          (program, name, status))
 RELEASE(clReleaseContext, (cl_context context), (context))
 RELEASE(clReleaseCommandQueue, (cl_command_queue queue), (queue))
 RELEASE(clReleaseMemObject, (cl_mem buffer), (buffer))
@@ -158,39 +131,7 @@ RELEASE(clEnqueueUnmapMemObject, (cl_command_queue queue, cl_mem buffer, void *m
 CREATE(void *, clEnqueueMapBuffer, (cl_command_queue queue, cl_mem buffer, cl_bool blocking, cl_map_flags flags,
        size_t offset, size_t size, cl_uint n, const cl_event *list, cl_event *event, cl_int *status),
        (queue, buffer, blocking, flags, offset, size, n, list, EVENT(event), status))
-STATUS(clEnqueueNDRangeKernel, (cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t *offset,
-       const size_t *global, const size_t *local, cl_uint n, const cl_event *list, cl_event *event),
-       (queue, kernel, dimensions, offset, global, local, n, list, EVENT(event)))
+STATUS_OF(clEnqueueNDRangeKernel, name_of(kernel), (cl_command_queue queue, cl_kernel kernel, cl_uint dimensions,
+          const size_t *offset, const size_t *global, const size_t *local, cl_uint n, const cl_event *list,
+          cl_event *event), (queue, kernel, dimensions, offset, global, local, n, list, EVENT(event)))
 // clang-format on
-
-int __real_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
-                          void *argument);
-int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
-                          void *argument);
-int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
-                          void *argument)
-{
-    return call_fails("pthread_create") ? EAGAIN : __real_pthread_create(thread, attributes, run, argument);
-}
-
-// Where _FILE_OFFSET_BITS is 64, on i386 or by OpenEXR's flags, the call is named statvfs64.
-int __real_statvfs(const char *path, struct statvfs *disk);
-int __real_statvfs64(const char *path, struct statvfs *disk);
-int __wrap_statvfs(const char *path, struct statvfs *disk);
-int __wrap_statvfs64(const char *path, struct statvfs *disk);
-
-static bool full_disk_report(struct statvfs *disk)
-{
-    if (disk_is_full) *disk = (struct statvfs){.f_blocks = 25, .f_bavail = 3, .f_frsize = 4096};
-    return disk_is_full;
-}
-
-int __wrap_statvfs(const char *path, struct statvfs *disk)
-{
-    return full_disk_report(disk) ? 0 : __real_statvfs(path, disk);
-}
-
-int __wrap_statvfs64(const char *path, struct statvfs *disk)
-{
-    return full_disk_report(disk) ? 0 : __real_statvfs64(path, disk);
-}

@@ -2,6 +2,7 @@
 #include "host/base/memory.h"
 #include "tests/check.h"
 #include "tests/failing/calls.h"
+#include "tests/failing/faults.h"
 #include "tests/scene_reading.h"
 #include <stdlib.h>
 #include <string.h>
@@ -60,15 +61,15 @@ void compute_close_checked(Compute *compute)
     if (live_count != 0) fail_msg("%ld objects were not released", live_count);
 }
 
-void assert_work_is_right(void)
+size_t assert_work_is_right(const char *counted)
 {
-    injected.call = NULL;
-    call_counts_clear();
+    injected = (Fault){.call = counted, .act = FAULT_COUNT};
     Compute compute;
     WorkResult result;
     assert_true(work(&compute, &result));
     compute_close_checked(&compute);
     assert_memory_equal(&result, &right, sizeof result);
+    return injected.count;
 }
 
 int work_set_up(void **state)

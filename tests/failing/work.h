@@ -27,5 +27,6 @@ bool work_receive_band(void *result, const Film *band);
 bool work(Compute *compute, WorkResult *result);
 // Closes the compute. Fails the test if an object was not released.
 void compute_close_checked(Compute *compute);
-// Works with no failure injected, and fails the test if the result is wrong.
-void assert_work_is_right(void);
+// Works with no failure injected, and fails the test if the result is wrong. Returns the number of calls of a
+// function, unless NULL.
+size_t assert_work_is_right(const char *counted);

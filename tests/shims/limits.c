@@ -18,7 +18,6 @@
 //   khr, nv, amd   the extensions of that vendor that tell devices of one name apart
 //   first=N        the watchdog: a kernel's launch fails if it has more than N work-items, and more than four
 //                  times those of its last launch
-//   fail=N         launches fail after the first N
 #define CL_TARGET_OPENCL_VERSION 120
 #define _GNU_SOURCE
 #include <CL/cl.h>
@@ -238,15 +237,16 @@ static size_t kernel_find(cl_kernel kernel)
 cl_mem clCreateBuffer(cl_context context, cl_mem_flags flags, size_t size, void *bytes, cl_int *status)
 {
     cl_ulong most, sum = size;
+    const bool is_free = getenv("GLINT_LIMITED");
     *status = CL_INVALID_BUFFER_SIZE;
-    if (limit_get("buffer", &most) && size > most) return NULL;
+    if (!is_free && limit_get("buffer", &most) && size > most) return NULL;
     pthread_mutex_lock(&mutex);
     for (size_t i = 0; i < BUFFERS_MAX; i++)
         sum += buffers[i].size;
     cl_mem buffer = NULL;
     *status = CL_MEM_OBJECT_ALLOCATION_FAILURE;
     const bool is_addressable = !limit_get("address", &most) || most != 32 || sum <= CL_UINT_MAX;
-    if (is_addressable && (!limit_get("memory", &most) || sum <= most))
+    if (is_free || (is_addressable && (!limit_get("memory", &most) || sum <= most)))
         buffer = NEXT(clCreateBuffer)(context, flags, size, bytes, status);
     if (buffer) {
         const size_t place = buffer_find(NULL);
@@ -302,15 +302,13 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
     pthread_mutex_lock(&mutex);
     const size_t place = kernel_find(kernel);
     size_t *last = &kernels[place].last_items;
-    static cl_ulong launches;
-    const bool fails = limit_get("fail", &most) && launches++ >= most;
     const bool is_too_long = limit_get("first", &most) && items > most && items > 4 * *last;
     *last = items;
     for (size_t i = 0; i < ARGUMENTS_MAX; i++)
         buffer_count += kernels[place].is_buffer[i];
     pthread_mutex_unlock(&mutex);
     if (limit_get("buffers", &most) && buffer_count > most) return CL_OUT_OF_RESOURCES;
-    if (fails || is_too_long) return CL_OUT_OF_RESOURCES;
+    if (is_too_long) return CL_OUT_OF_RESOURCES;
     return NEXT(clEnqueueNDRangeKernel)(queue, kernel, dimensions, first, global, local, wait_count, wait,
                                         event);
 }
