@@ -151,67 +151,6 @@ TEST_AT_EACH_PRECISION(spot_cone)
     check(between > 1000);
 }
 
-// Returns Phong's term at the surface that the film shows behind a pixel.
-static long double highlight_of(const Film *film, const Scene *scene, size_t pixel, double shininess)
-{
-    const double *p = film->position + 3 * pixel, *n = film->normal + 3 * pixel;
-    Vector3 eye = scene->camera.position, light = scene->lights.items[0].position;
-    long double to_light[3] = {light.x - eye.x - p[0], light.y - eye.y - p[1], light.z - eye.z - p[2]};
-    long double to_eye[3] = {-p[0], -p[1], -p[2]};
-    long double facing = 0, squared_light = 0, squared_eye = 0, squared_normal = 0;
-    for (size_t k = 0; k < 3; k++) {
-        facing += n[k] * to_light[k];
-        squared_light += to_light[k] * to_light[k];
-        squared_eye += to_eye[k] * to_eye[k];
-        squared_normal += (long double)n[k] * n[k];
-    }
-    if (facing <= 0) return 0;
-    long double squared_difference = 0;
-    for (size_t k = 0; k < 3; k++) {
-        long double reflected = 2 * facing / squared_normal * n[k] - to_light[k];
-        long double difference = reflected / sqrtl(squared_light) - to_eye[k] / sqrtl(squared_eye);
-        squared_difference += difference * difference;
-    }
-    long double s = squared_difference / 2;
-    if (shininess == 0) return 1;
-    return s >= 1 ? 0 : expl((long double)shininess * log1pl(-s));
-}
-
-// Highlights of every sharpness on a sphere are never below 0 nor above ks, nor NaN. Light and eye are
-// as far from the center, so that the peak is halfway between. The field of view narrows with the highlight.
-TEST_AT_EACH_PRECISION(highlight)
-{
-    static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
-    OwnedScene scene = scene_of(
-        "camera: {position: [0.5, 0.25, 4], look_at: [0, 0, 1], fov: 32}\n"
-        "lights: [{point: {position: [-0.25, 0.5, 4]}}]\n"
-        "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
-    scene.camera.look_at =
-        vector_normalize(vector_add(scene.camera.position, scene.lights.items[0].position));
-    for (size_t e = 0; e < COUNT_OF(exponents); e++) {
-        snprintf(place, sizeof place, "%s, shininess %g", precision_names[precision], exponents[e]);
-        scene.camera.half_tangent = fmin(0.3, 0.6 / sqrt(fmax(exponents[e], 1)));
-        scene.materials.items[scene.objects.items[0].material].shininess = exponents[e];
-        // `single` is checked up to 1e4 only: beyond, the normal's own rounding shows
-        double tolerance = precision == PRECISION_DOUBLE                          ? 1e-8
-                           : precision == PRECISION_STRICT                        ? 1e-4
-                           : precision == PRECISION_SINGLE && exponents[e] <= 1e4 ? 2e-3
-                                                                                  : 2;
-        OwnedFilm film = render(&scene, 201, 201, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
-        double brightest = 0;
-        for (size_t i = 0; i < (size_t)201 * 201; i++) {
-            double value = film.color[3 * i];
-            check(value >= 0 && value <= 1 + 0x1p-20);
-            brightest = fmax(brightest, value);
-            if (film.object[i] == UINT32_MAX) continue;
-            double expected = (double)highlight_of(&film, &scene, i, exponents[e]);
-            // where the light only grazes, its own sign is a matter of rounding
-            if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
-        }
-        check(brightest > 1 - 1e-3);
-    }
-}
-
 // The eye and a light are inside a closed shape, all of which is seen and lit.
 TEST_AT_EACH_PRECISION(inside)
 {

@@ -55,7 +55,7 @@ class Documentation(unittest.TestCase):
 class Verify(VerifyTestCase):
     def test_cases_pass(self):
         self.assertGreater(len(ALL_CASES), 40)
-        few = ["S1", "P2", "P7", "C7", "T3", "M3", "R1", "R8"]
+        few = ["S1", "P2", "P7", "C7", "T3", "M3", "R1", "R5", "R8"]
         for precision in ["single"] if IS_SANITIZED else PRECISIONS:
             with self.subTest(precision=precision):
                 cases = ALL_CASES if not IS_SANITIZED and (IS_LONG or precision == "single") else few
