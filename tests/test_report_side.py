@@ -41,8 +41,8 @@ def save(path, value):
 
 
 def figures(text):
-    """Returns the report's letter and the frame time, or -, of each line of a row."""
-    return re.findall(r"(?m)^.*?\b([A-Z]) +(-|[0-9.]+)", text.partition("frame ms")[2])
+    """Returns the report's letter and the frame time, or "unavailable", of each line of a row."""
+    return re.findall(r"(?m)^(?:.* )?([A-Z]) +(unavailable|[0-9.]+)", text.partition("frame ms")[2])
 
 
 def embedded(page):
@@ -65,31 +65,31 @@ class SideBySide(TestCase):
         older = report(run(10), run(20, scene_hash="00000000000000a2", scene="b.yaml"), run(5, precision="strict"))
         newer = report(run(5.5, precision="strict", scene="moved.yaml"), run(20.2, scene_hash="00000000000000a2"), run(5))
         out, data = self.compared(older, newer)
-        self.assertEqual([row["name"] for row in data["rows"]],
-                         [["scenes/a.yaml", "single"], ["b.yaml", "single"], ["scenes/a.yaml", "strict"]])  # fmt: skip
-        self.assertEqual(data["columns"], ["scene", "precision"])
+        self.assertEqual([(row["scene"], row["precision"]) for row in data["rows"]],
+                         [("scenes/a.yaml", "single"), ("b.yaml", "single"), ("scenes/a.yaml", "strict")])  # fmt: skip
         cells = [row["cells"][1] for row in data["rows"]]
-        self.assertEqual([cell["verdict"] for cell in cells], ["faster", "same", "slower"])
+        self.assertEqual([cell["comparison"]["verdict"] for cell in cells], ["faster", "same", "slower"])
         for cell, ratio in zip(cells, (0.5, 1.01, 1.1), strict=True):
-            self.assertAlmostEqual(cell["ratio"], ratio, places=9)
-            self.assertTrue(cell["low"] < ratio < cell["high"] < 1.1 * ratio, cell)
+            self.assertAlmostEqual(cell["comparison"]["ratio"], ratio, places=9)
+            self.assertTrue(cell["comparison"]["low"] < ratio < cell["comparison"]["high"] < 1.1 * ratio, cell)
         self.assertEqual([(letter, float(frame)) for letter, frame in figures(out)],
                          [("A", 10), ("B", 5), ("A", 20), ("B", 20.2), ("A", 5), ("B", 5.5)])  # fmt: skip
-        self.assertRegex(out, r"(?m)^ +B    5\.0000  4\.9900 to 5\.0100 +2\.5000  0\.500 \(0\.4\d\d to 0\.5\d\d\) faster$")
+        self.assertRegex(out, r"(?m)^scene +precision +report +frame ms +quartile +quartile +kernel ms +time +verdict$")
+        self.assertRegex(out, r"(?m)^ +B +5  +4\.990  +5\.010  +2\.500  0\.5000 \(0\.4\d\d to 0\.5\d\d\)  faster$")
         self.assertIn("3 rows, 3 with times in A and here: 0.822 times A's frame time (geometric mean), 1 faster, 1 slower, 1 same", out)
         self.assertAlmostEqual(data["reports"][1]["mean_ratio"], (0.5 * 1.01 * 1.1) ** (1 / 3), places=9)
-        self.assertIn("\nsize 64x48, lanes 16, BVH auto, samples 1, bounces 5\n", out)
+        self.assertIn("\n\n64x48, lanes 16, BVH auto, samples 1, bounces 5\n", out)
 
     def test_calibration(self):
         """A host at half its speed explains twice the time, as in glint bench --compare. On a CPU its processor time counts."""
         older, newer = report(run(10), kind="gpu"), report(run(20), kind="gpu")
         newer["calibration"]["samples_ms"] = [6.0] * RUNS
-        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["verdict"], "undecided")
+        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["comparison"]["verdict"], "undecided")
         newer["calibration"]["samples_ms"] = [3.0] * RUNS
-        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["verdict"], "slower")
+        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["comparison"]["verdict"], "slower")
         older, newer = report(run(10)), report(run(10))
         newer["runs"][0]["processor_samples_ms"] = [200] * RUNS
-        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["verdict"], "slower")
+        self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["comparison"]["verdict"], "slower")
 
     def test_no_verdict(self):
         """Without a verdict, only the ratio of medians is printed, and the reason."""
@@ -112,11 +112,11 @@ class SideBySide(TestCase):
             with self.subTest(reason):
                 out, data = self.compared(older, other)
                 cell = data["rows"][0]["cells"][1]
-                self.assertEqual((cell["ratio"], cell["kernel_ratio"]), (0.5, 0.5))
-                self.assertNotIn("verdict", cell)
-                self.assertIn(reason, cell["why_not"])
-                self.assertRegex(out, f"no verdicts?,? since .*{reason}")
-                self.assertRegex(out, r"(?m)  0\.500(, no verdict since .*)?$")
+                self.assertEqual((cell["comparison"]["ratio"], cell["kernel_ratio"]), (0.5, 0.5))
+                self.assertNotIn("verdict", cell["comparison"])
+                self.assertIn(reason, cell["comparison"]["why_not"])
+                self.assertRegex(out, f"(?m)^ +no verdicts?, since .*{reason}")
+                self.assertRegex(out, r"(?m)  0\.5000$")
         scrubbed = report(run(10), host="HOST")  # as glint report writes it
         self.assertIn("the first report has another calibration or none", self.compared(uncalibrated, older)[0])
         self.assertIn("the host of one of the reports is unknown", self.compared(scrubbed, scrubbed)[0])
@@ -126,11 +126,13 @@ class SideBySide(TestCase):
         """Rows may be missing from some reports or may have failed, and two reports may have no row in common."""
         failed = KEY | {"precision": "double", "status": "unavailable", "reason": "no doubles here"}
         out, data = self.compared(report(run(10), run(30, samples=4)), report(run(10), failed), report(run(7, samples=4)))
-        self.assertEqual([[cell and cell.get("frame_ms", {}).get("median") and True for cell in row["cells"]] for row in data["rows"]],
-                         [[True, True, None], [True, None, True], [None, None, None]])  # fmt: skip
-        self.assertEqual(data["rows"][2]["cells"][1]["failure"], "no doubles here")
-        self.assertEqual([frame == "-" for _, frame in figures(out)], [False, False, True, False, True, False, True, True, True])
-        self.assertRegex(out, r"(?m) B +-  no doubles here$")
+        self.assertEqual([["frame_ms" in cell for cell in row["cells"]] for row in data["rows"]],
+                         [[True, True, False], [True, False, True], [False, False, False]])  # fmt: skip
+        self.assertEqual(data["rows"][2]["cells"][1]["reason"], "no doubles here")
+        self.assertEqual([frame == "unavailable" for _, frame in figures(out)],
+                         [False, False, True, False, True, False, True, True, True])  # fmt: skip
+        self.assertRegex(out, r"(?m) B +unavailable: no doubles here$")
+        self.assertRegex(out, r"(?m) C +unavailable: no such row$")
         self.assertEqual([entry["common"] for entry in data["reports"]], [0, 1, 1])
         out, data = self.compared(report(run(10)), report(run(10, bounces=6)))
         self.assertEqual(len(data["rows"]), 2)
@@ -140,15 +142,15 @@ class SideBySide(TestCase):
         """A device's number of lanes does not make another row, but several numbers do. If they differ, no verdict is printed."""
         out, data = self.compared(report(run(10)), report(run(1, lanes=1), name="gpu-x", kind="gpu"), report(run(9, lanes=8)))
         self.assertEqual([[cell["lanes"] for cell in row["cells"]] for row in data["rows"]], [[16, 1, 8]])
-        self.assertIn("their lanes differ", data["rows"][0]["cells"][2]["why_not"])
-        self.assertRegex(out, "lanes +frame ms.*\n16 +A .*\n1 +B .*\n8 +C .*, no verdict since their lanes differ\n")
+        self.assertIn("their lanes differ", data["rows"][0]["cells"][2]["comparison"]["why_not"])
+        self.assertRegex(out, "lanes +report +frame ms.*\n +16 +A .*\n +1 +B .*\n +8 +C .*\n    no verdict, since their lanes differ\n")
         data = self.compared(report(run(10)), report(run(20, lanes=1), run(9)))[1]
-        self.assertEqual([[cell and cell["lanes"] for cell in row["cells"]] for row in data["rows"]], [[16, 16], [None, 1]])
+        self.assertEqual([[cell.get("lanes") for cell in row["cells"]] for row in data["rows"]], [[16, 16], [None, 1]])
 
     def test_one_report(self):
         out, data = self.compared(report(run(10), run(20, samples=2)))
         self.assertNotIn("times A", out)
-        self.assertEqual([(len(row["cells"]), "ratio" in row["cells"][0]) for row in data["rows"]], [(1, False)] * 2)
+        self.assertEqual([(len(row["cells"]), "comparison" in row["cells"][0]) for row in data["rows"]], [(1, False)] * 2)
 
     def test_refused(self):
         good = save("good.json", report(run(10)))
@@ -174,7 +176,7 @@ class SideBySide(TestCase):
     def test_names_are_escaped(self):
         name = "</script><!--<script>\"é'.yaml"
         data = self.compared(report(run(10, scene=name), run(1, scene_hash="00000000000000a2")), report(run(10), name="<b>"))[1]
-        self.assertEqual((data["rows"][0]["name"][0], data["reports"][1]["device"]), (name, "<b>"))
+        self.assertEqual((data["rows"][0]["scene"], data["reports"][1]["device"]), (name, "<b>"))
         self.assertNotIn("<b>", Path("page.html").read_text(encoding="utf-8"))
 
     @unittest.skipUnless(shutil.which("chromium"), "chromium is not installed")

@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-static const ResultTable table = {
+static const ResultTable scene_table = {
     .rows = "scenes.runs",
     .names = {"scene", "size", "precision", "lanes", "variant"},
     .values = {"frame ms", "wrong objects at edges=errors.object", "build=build", "over first=ratio",
@@ -17,7 +17,7 @@ static void row_notes(const void *context, size_t row, Text *notes)
     if (row == *(const size_t *)context) text_appendf(notes, "    a note\n");
 }
 
-static void assert_prints(const char *document, const char *expected)
+static void assert_prints_table(const ResultTable *table, const char *document, const char *expected)
 {
     const size_t noted = 1;
     char *printed = NULL;
@@ -25,11 +25,16 @@ static void assert_prints(const char *document, const char *expected)
     FILE *stream = open_memstream(&printed, &length);
     json_t *loaded = json_loads(document, 0, NULL);
     assert_non_null(loaded);
-    result_text_print(loaded, &table, row_notes, &noted, stream);
+    result_text_print(loaded, table, row_notes, &noted, stream);
     fclose(stream);
     json_decref(loaded);
     assert_string_equal(printed, expected);
     free(printed);
+}
+
+static void assert_prints(const char *document, const char *expected)
+{
+    assert_prints_table(&scene_table, document, expected);
 }
 
 TEST(a_table_shows_what_differs)
@@ -68,6 +73,37 @@ TEST(each_scene_has_a_table)
     assert_prints(
         "{\"scenes\": [{\"scene\": \"a\", \"runs\": [{\"status\": \"unavailable\", \"reason\": \"lost\"}]}]}",
         "\na\nunavailable: lost\n");
+}
+
+TEST(one_table_has_all_scenes)
+{
+    static const ResultTable table = {
+        .rows = "scenes.runs",
+        .names = {"scene", "size", "lanes", "report"},
+        .values = {"ms"},
+        .is_one_table = true,
+    };
+    assert_prints_table(
+        &table,
+        "{\"scenes\": [{\"scene\": \"a\", \"lanes\": 8, \"size\": [4, 3], \"runs\": [{\"report\": \"A\", "
+        "\"ms\": 1},"
+        " {\"report\": \"B\", \"ms\": 2}, {\"report\": \"C\", \"lanes\": 1, \"ms\": 3}]},"
+        " {\"scene\": \"b\", \"lanes\": 8, \"size\": [4, 3], \"runs\": [{\"report\": \"A\", \"ms\": 4}]}]}",
+        "\n"
+        "4x3\n"
+        "scene  lanes  report  ms\n"
+        "a          8  A        1\n"
+        "              B        2\n"
+        "    a note\n"
+        "           1  C        3\n"
+        "b          8  A        4\n");
+}
+
+TEST(a_sole_name_is_a_column)
+{
+    static const ResultTable table = {
+        .rows = "runs", .names = {"run"}, .values = {"ms"}, .is_one_table = true};
+    assert_prints_table(&table, "{\"runs\": [{\"run\": 0, \"ms\": 1}]}", "run  ms\n  0   1\n");
 }
 
 TEST_MAIN(NULL, NULL)

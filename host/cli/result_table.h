@@ -5,7 +5,7 @@
 #include "host/base/text.h"
 #include <jansson.h>
 
-enum { RESULT_NAMES_MAX = 8, RESULT_VALUES_MAX = 18, RESULT_EXTRAS_MAX = 6 };
+enum { RESULT_NAMES_MAX = 9, RESULT_VALUES_MAX = 18, RESULT_EXTRAS_MAX = 6 };
 
 typedef struct {
     const char *command;
@@ -24,6 +24,7 @@ typedef struct {
     // command measures none.
     const char *times, *processor_times;
     const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
+    bool is_one_table;   // whether the text has one table instead of one for each scene and size
 } ResultTable;
 
 // A row with the objects that its columns may come from.

@@ -89,8 +89,8 @@ static void columns_choose(RowGroup *group)
 {
     const char *column;
     for (size_t i = 0; (column = text_column(group, i)); i++) {
-        group->is_shown[i] =
-            any_has_value(group, column) && (i >= group->name_count || !all_share(group, column));
+        group->is_shown[i] = any_has_value(group, column) &&
+                             (i >= group->name_count || group->name_count == 1 || !all_share(group, column));
         if (group->is_shown[i]) text_appendf(&group->alignment, any_is_text(group, column) ? "l" : "r");
     }
 }
@@ -98,7 +98,7 @@ static void columns_choose(RowGroup *group)
 // Prints the names that all rows share.
 static void shared_names_print(const RowGroup *group, FILE *stream)
 {
-    Text line = {0};
+    OwnedText line = {0};
     for (size_t i = 0; i < group->name_count; i++) {
         const char *column = group->table->names[i];
         if (group->is_shown[i] || !any_has_value(group, column)) continue;
@@ -106,8 +106,7 @@ static void shared_names_print(const RowGroup *group, FILE *stream)
         if (i >= GROUP_NAMES) text_appendf(&line, "%s ", column_heading(column).text);
         value_append_plain(&line, &group->rows[0], column);
     }
-    fprintf(stream, "\n%s\n", text_c(&line));
-    text_free(&line);
+    if (line.count > 0) fprintf(stream, "\n%s\n", text_c(&line));
 }
 
 // Returns the length of the words of a heading that share a line, or of the only word.
@@ -163,11 +162,24 @@ static void cell_append(Text *lines, const ResultRow *row, const char *column)
     text_append(lines, "\t", 1);
 }
 
+// Returns whether a column is a name that belongs to the object around this row and the one above it.
+static bool is_repeated(const RowGroup *group, const ResultRow *row, size_t column)
+{
+    const ResultRow alone = {{row->sources[0]}};
+    return column < group->name_count && row > group->rows && row->sources[1] == row[-1].sources[1] &&
+           !column_value(&alone, text_column(group, column));
+}
+
 static void row_append(RowGroup *group, const ResultRow *row)
 {
     const char *column, *reason = row_unavailable(row);
-    for (size_t i = 0; (column = text_column(group, i)) && (!reason || i < group->name_count); i++)
-        if (group->is_shown[i]) cell_append(&group->lines, row, column);
+    for (size_t i = 0; (column = text_column(group, i)) && (!reason || i < group->name_count); i++) {
+        if (!group->is_shown[i]) continue;
+        if (is_repeated(group, row, i))
+            text_append(&group->lines, "\t", 1);
+        else
+            cell_append(&group->lines, row, column);
+    }
     if (reason) {
         text_appendf(&group->lines, "unavailable: ");
         plain_append(&group->lines, reason);
@@ -199,7 +211,7 @@ static void group_print(RowGroup *group, size_t first, RowNotes *notes, const vo
     headings_append(group);
     for (size_t i = 0; i < group->count; i++) {
         row_append(group, &group->rows[i]);
-        notes(context, first + i, &group->lines);
+        if (notes) notes(context, first + i, &group->lines);
     }
     table_print(text_c(&group->lines), text_c(&group->alignment), stream);
     reasons_print(group, stream);
@@ -215,8 +227,9 @@ void result_text_print(const json_t *document, const ResultTable *table, RowNote
         const ResultRow *row = &rows.items[first];
         for (next = first + 1; next < rows.count; next++) {
             const ResultRow *other = &rows.items[next];
-            if (row->sources[1] != other->sources[1] || !rows_share(row, other, table->names[0]) ||
-                !rows_share(row, other, table->names[1]))
+            if (!table->is_one_table &&
+                (row->sources[1] != other->sources[1] || !rows_share(row, other, table->names[0]) ||
+                 !rows_share(row, other, table->names[1])))
                 break;
         }
         RowGroup group = {.table = table, .rows = row, .count = next - first};

@@ -9,35 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    COLUMN_SCENE,
-    COLUMN_SIZE,
-    COLUMN_PRECISION,
-    COLUMN_LANES,
-    COLUMN_BVH,
-    COLUMN_SAMPLES,
-    COLUMN_BOUNCES,
-    COLUMN_VARIANT
-};
-
-Text side_column_text(const BenchKey *key, size_t column)
-{
-    const char *const texts[SIDE_COLUMNS] = {[COLUMN_SCENE] = key->scene,
-                                             [COLUMN_PRECISION] = key->precision,
-                                             [COLUMN_BVH] = key->bvh,
-                                             [COLUMN_VARIANT] = key->variant};
-    const uint32_t numbers[SIDE_COLUMNS] = {
-        [COLUMN_LANES] = key->lanes, [COLUMN_SAMPLES] = key->samples, [COLUMN_BOUNCES] = key->bounces};
-    Text text = {0};
-    if (column == COLUMN_SIZE)
-        text_appendf(&text, "%ux%u", key->width, key->height);
-    else if (texts[column])
-        text_appendf(&text, "%s", texts[column]);
-    else
-        text_appendf(&text, "%u", numbers[column]);
-    return text;
-}
-
 static bool key_equal_but_lanes(const BenchKey *a, const BenchKey *b)
 {
     BenchKey other = *b;
@@ -127,24 +98,6 @@ static void report_compare(SideBySide *side, size_t index)
     if (report->ratio_count > 0) report->mean_ratio = exp(logarithms / (double)report->ratio_count);
 }
 
-// Returns whether rows differ in a column. Scenes are compared by hash, not by path.
-static bool column_differs(const SideBySide *side, size_t column)
-{
-    const BenchKey *first = &side_first(side, 0)->row->key;
-    Text text = side_column_text(first, column);
-    bool differs = false;
-    for (size_t i = 0; i < side->row_count * side->report_count && !differs; i++) {
-        if (!side->cells[i].row) continue;
-        const BenchKey *key = &side->cells[i].row->key;
-        Text other = side_column_text(key, column);
-        differs = column == COLUMN_SCENE ? key->scene_hash != first->scene_hash
-                                         : strcmp(text_c(&text), text_c(&other)) != 0;
-        text_free(&other);
-    }
-    text_free(&text);
-    return differs;
-}
-
 // Adds a message unless the report has rows and each has the hash of its scene.
 static void rows_check(const SideReport *report, MessageList *messages)
 {
@@ -177,8 +130,6 @@ static bool side_by_side_open(SideBySide *side, char *const *paths, size_t count
             row_place(side, i, &side->reports[i].baseline->items[k]);
     for (size_t i = 1; i < count; i++)
         report_compare(side, i);
-    for (size_t column = 0; column < SIDE_COLUMNS; column++)
-        side->is_shown[column] = column_differs(side, column);
     return true;
 }
 
@@ -217,7 +168,7 @@ int side_by_side_run(char *const *paths, size_t count, const char *page)
     const bool is_done = !(page && page_overwrites(page, paths, count, &messages)) &&
                          side_by_side_open(&side, paths, count, &messages) &&
                          (!page || page_write(&side, page, &messages));
-    if (is_done) side_by_side_print(&side, stdout);
+    if (is_done) side_by_side_print(&side);
     messages_print(&messages, NULL);
     side_by_side_close(&side);
     return is_done ? EXIT_DONE : EXIT_USER;

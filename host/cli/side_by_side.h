@@ -5,7 +5,7 @@
 #include "host/cli/bench_report.h"
 #include "host/measure/baseline.h"
 
-enum { SIDE_REPORTS_MAX = 26, SIDE_COLUMNS = 8 }; // a report is named by a letter
+enum { SIDE_REPORTS_MAX = 26 }; // a report is named by a letter
 
 // A report, and the summary of its comparison with the first.
 typedef struct {
@@ -31,7 +31,6 @@ typedef struct {
     size_t report_count;
     SideCell *cells; // row by row, one of each report
     size_t row_count;
-    bool is_shown[SIDE_COLUMNS]; // the columns of a row's name in which rows differ
 } SideBySide;
 
 // Reads reports, prints their comparison and writes it as a page unless `page` is NULL. Returns the exit
@@ -44,9 +43,6 @@ static inline SideCell *side_cell(const SideBySide *side, size_t row, size_t rep
 {
     return &side->cells[row * side->report_count + report];
 }
-// Returns the value of a column of a row's name, which the caller frees. These columns are the names of
-// bench_table.
-Text side_column_text(const BenchKey *key, size_t column);
 
-void side_by_side_print(const SideBySide *side, FILE *stream);
+void side_by_side_print(const SideBySide *side);
 Json *side_by_side_json(const SideBySide *side); // what the page draws; the caller closes it

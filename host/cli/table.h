@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-enum { TABLE_COLUMNS_MAX = 26 };
+enum { TABLE_COLUMNS_MAX = 27 };
 
 // Prints lines of cells, each of which ends with a tab, with every column as wide as its longest cell.
 // `alignment` has an 'l' or 'r' for each column, of which there are at most TABLE_COLUMNS_MAX. Text after the

@@ -82,7 +82,7 @@ static BaselineRow row_of(const json_t *run)
                 .scene_hash = hash_of(json_object_get(run, "scene_hash")),
                 .precision = text_of(json_object_get(run, "precision")),
                 .bvh = text_of(json_object_get(run, "bvh")),
-                .variant = text_of(json_object_get(run, "variant")),
+                .variant = json_string_value(json_object_get(run, "variant")),
                 .lanes = count_of(json_object_get(run, "lanes")),
                 .width = count_of(json_array_get(size, 0)),
                 .height = count_of(json_array_get(size, 1)),

@@ -12,7 +12,8 @@ enum { BENCH_SCHEMA = 6 }; // the version of the reports' schema
 // The ratio of times up to which rows of two reports count as the same, unless the user chooses another.
 extern const double baseline_tolerance;
 
-// A row of a report, with times in seconds. Members that the report lacks are zeros, or "" for texts.
+// A row of a report, with times in seconds. Members that the report lacks are zeros, or "" for texts,
+// except that a missing variant is NULL.
 typedef struct {
     BenchKey key;
     const char *failure;   // why the row has no times

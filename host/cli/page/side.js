@@ -1,7 +1,7 @@
 // Draws a comparison of benchmark reports: their origins, a line per row and report, and all figures.
 "use strict";
 
-const { reports, rows, columns, constants, confidence, tolerance } =
+const { reports, rows, confidence, tolerance } =
   JSON.parse(document.getElementById("report").textContent);
 const hasRatios = reports.length > 1;
 const find = (selector) => document.querySelector(selector);
@@ -44,9 +44,9 @@ function drawReport(report, index) {
 
 // Returns the cells' positions on the axis, relative to the first report's median if there are several, else in milliseconds.
 function placesOf(row, measure) {
-  const base = hasRatios ? row.cells[0]?.[measure]?.median : 1;
+  const base = hasRatios ? row.cells[0][measure]?.median : 1;
   return row.cells.map((cell) => {
-    const time = cell?.[measure];
+    const time = cell[measure];
     if (!base || !time) return null;
     const { median, lower_quartile: lower = median, upper_quartile: upper = median } = time;
     return { median: median / base, lower: lower / base, upper: upper / base };
@@ -86,22 +86,19 @@ function drawBar(place, label, { ticks, x }) {
 
 // Draws cells with the ratio to the first report, and its interval and verdict where there are any.
 function drawRatio(cell, measure) {
-  const isFrame = measure === "frame_ms", ratio = isFrame ? cell.ratio : cell.kernel_ratio;
+  const { ratio, low, high, verdict = "" } = (measure === "frame_ms" ? cell.comparison : { ratio: cell.kernel_ratio }) ?? {};
   if (!ratio) return [html("td"), html("td")];
-  const hasVerdict = isFrame && cell.verdict;
   return [
-    html("td", {}, formatNumber(ratio),
-         hasVerdict ? html("span", { class: "interval" }, ` (${rangeText(cell.low, cell.high)})`) : ""),
-    html("td", { class: `verdict ${hasVerdict ? cell.verdict : ""}` }, hasVerdict ? cell.verdict : ""),
+    html("td", {}, formatNumber(ratio), verdict && html("span", { class: "interval" }, ` (${rangeText(low, high)})`)),
+    html("td", { class: `verdict ${verdict}` }, verdict),
   ];
 }
 
 function drawLine(row, index, place, measure, layout) {
-  const cell = row.cells[index], time = cell?.[measure];
+  const cell = row.cells[index], time = cell[measure];
   const line = html("tr", { class: reportClass(index) }, html("th", { scope: "row" }, drawLetter(index)));
   if (!time) {
-    const reason = cell ? cell.failure ?? "no time" : "no such row";
-    line.append(html("td", { class: "words", colspan: hasRatios ? 4 : 2 }, reason));
+    line.append(html("td", { class: "words", colspan: hasRatios ? 4 : 2 }, cell.reason ?? "no time"));
     return line;
   }
   const label = `${letterOf(index)}: ${formatMs(time.median)}` + (time.lower_quartile === undefined ? "" :
@@ -136,16 +133,21 @@ function drawBars() {
       ...row.cells.map((_, index) => drawLine(row, index, places[i][index], measure, layout)))));
 }
 
-// Joins the parts of a name. Scene, size, precision and variant need no heading; other values do.
-const joinName = ({ name }, isNamed) => columns.flatMap((heading, i) => {
-  if (!name[i] || !isNamed(heading)) return [];
-  return ["scene", "size", "precision", "variant"].includes(heading) ? name[i] : `${heading} ${name[i]}`;
+// Joins members of a row's name. Scene, size, precision and variant need no heading; other values do.
+const joinMembers = (row, members) => members.flatMap((member) => {
+  const value = [row[member] ?? ""].flat().join("x");
+  if (!value) return [];
+  return ["scene", "size", "precision", "variant"].includes(member) ? value : `${member === "bvh" ? "BVH" : member} ${value}`;
 }).join(", ");
 
-// Reports may differ in a row's lanes, which are part of its name only if names would otherwise be ambiguous.
-const shortNames = rows.map((row) => joinName(row, (heading) => heading !== "lanes"));
-const areShort = new Set(shortNames).size === rows.length;
-const nameOf = (row) => joinName(row, (heading) => heading !== "lanes" || !areShort);
+// A row is named by the members in which rows differ. Scenes are compared by hash, not by path. Reports may differ in a row's lanes,
+// which are part of its name only if names would otherwise be ambiguous.
+const members = ["scene", "size", "precision", "lanes", "bvh", "samples", "bounces", "variant"];
+const valuesOf = (member) => rows.flatMap((row) => row.cells.map((cell) => String(cell[member] ?? row[member])));
+const areEqual = (member) => new Set(valuesOf(member === "scene" ? "scene_hash" : member)).size === 1;
+const shared = members.filter(areEqual), named = members.filter((member) => !areEqual(member));
+const areShort = new Set(rows.map((row) => joinMembers(row, named.filter((member) => member !== "lanes")))).size === rows.length;
+const nameOf = (row) => joinMembers(row, named.filter((member) => member !== "lanes" || !areShort));
 
 const figures = [
   ["Frame, ms", (cell) => cell.frame_ms?.median, formatNumber],
@@ -157,15 +159,16 @@ const figures = [
   ["Lanes", (cell) => cell.lanes, formatCount],
 ];
 const ratioFigures = [
-  ["Times A", (cell) => cell.ratio, formatNumber],
-  ["Interval", (cell) => cell.low && rangeText(cell.low, cell.high), String],
-  ["Verdict", (cell, report) => cell.verdict ?? (cell.why_not && (report.why_not ? "none" : `none: ${cell.why_not}`)), String],
+  ["Times A", ({ comparison }) => comparison?.ratio, formatNumber],
+  ["Interval", ({ comparison }) => comparison?.verdict && rangeText(comparison.low, comparison.high), String],
+  ["Verdict", ({ comparison }, report) =>
+    comparison && (comparison.verdict ?? (report.why_not ? "none" : `none: ${comparison.why_not}`)), String],
 ];
 
 function drawFigures() {
   const shown = hasRatios ? [...figures, ...ratioFigures] : figures;
   const values = (cell, index) => shown.map(([, value, format]) => {
-    const found = cell ? value(cell, reports[index]) : undefined;
+    const found = value(cell, reports[index]);
     return found === undefined ? html("td", { class: "missing" }, "–") : html("td", {}, format(found));
   });
   find(".figures").append(
@@ -176,7 +179,7 @@ function drawFigures() {
 
 document.title = reports.map(({ file }) => file).join(", ");
 find(".reports").append(...reports.map(drawReport));
-find(".facts").append(constants ? `All rows: ${constants}.` : "");
+find(".facts").append(shared.length ? `All rows: ${joinMembers(rows[0], shared)}.` : "");
 find(".note").append(`The axis is logarithmic; to the left is faster${hasRatios ? " than A" : ""}. A dot is the median, a box ` +
                      "spans the quartiles of the runs.");
 find("#verdict").append(`“Same”: the interval lies within ${formatNumber(1 / tolerance)} to ${formatNumber(tolerance)}. Otherwise ` +
