@@ -4,10 +4,44 @@
 #include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
+#include "host/cli/bench_report.h"
 #include "host/cli/page.h"
+#include "host/cli/report_json.h"
+#include "host/measure/baseline.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+// A report, and the summary of its comparison with the first.
+typedef struct {
+    const char *path;
+    Baseline *baseline;
+    const char *why_not;                 // why none of its rows has a verdict, or NULL
+    double mean_ratio;                   // the geometric mean of the ratios of frame times
+    size_t ratio_count;                  // how many rows both have
+    size_t verdicts[VERDICT_FASTER + 1]; // rows by verdict
+} SideReport;
+
+// A report's times of a row next to those of the first report.
+typedef struct {
+    const BaselineRow *row; // NULL if the report does not have the row
+    double ratio; // of frame times to the first report's, by calibrations where `comparison` has an interval,
+                  // else of medians; 0 if either has none
+    double kernel_ratio;      // of kernel times, or 0
+    RowComparison comparison; // if there is a ratio; `why_not` states why it has neither interval nor verdict
+} SideCell;
+
+typedef struct {
+    SideReport reports[SIDE_REPORTS_MAX];
+    size_t report_count;
+    SideCell *cells; // row by row, one of each report
+    size_t row_count;
+} SideBySide;
+
+static SideCell *side_cell(const SideBySide *side, size_t row, size_t report)
+{
+    return &side->cells[row * side->report_count + report];
+}
 
 static bool key_equal_but_lanes(const BenchKey *a, const BenchKey *b)
 {
@@ -30,7 +64,8 @@ static bool lanes_matter(const SideBySide *side, const BenchKey *key)
     return false;
 }
 
-const SideCell *side_first(const SideBySide *side, size_t row)
+// Returns the first cell of a row that has one.
+static const SideCell *side_first(const SideBySide *side, size_t row)
 {
     const SideCell *cell = side_cell(side, row, 0);
     while (!cell->row)
@@ -140,6 +175,133 @@ static void side_by_side_close(SideBySide *side)
     free(side->cells);
 }
 
+static const ResultTable side_table = {
+    .rows = "rows.cells",
+    .names = {"scene", "size", "precision", "lanes", "BVH=bvh", "samples", "bounces", "variant", "report"},
+    .values = {"frame ms=frame_ms.median", "lower quartile=frame_ms.lower_quartile",
+               "upper quartile=frame_ms.upper_quartile", "kernel ms=kernel_ms.median",
+               "times A's frame time=comparison", "verdict=comparison.verdict"},
+    .is_one_table = true,
+};
+
+static char report_letter(size_t report)
+{
+    return (char)('A' + report);
+}
+
+static void report_json(Json *json, const SideReport *report)
+{
+    const Baseline *baseline = report->baseline;
+    json_begin_object(json, NULL);
+    json_addf(json,
+              "file %s date %s glint %s commit %s device %s board %s platform %s driver %s host %s rows %zu "
+              "common %zu",
+              report->path, baseline->date, baseline->version, baseline->commit, baseline->device,
+              baseline->board, baseline->platform, baseline->driver, baseline->host, baseline->count,
+              report->ratio_count);
+    if (report->ratio_count > 0) json_number(json, "mean_ratio", report->mean_ratio);
+    if (report->why_not) json_text(json, "why_not", report->why_not);
+    for (size_t verdict = 0; verdict <= VERDICT_FASTER; verdict++)
+        json_count(json, verdict_names[verdict], report->verdicts[verdict]);
+    json_end(json);
+}
+
+static void times_summary_json(Json *json, const char *key, const Summary *seconds)
+{
+    if (seconds->count == 0) return;
+    json_begin_object(json, key);
+    json_addf(json, "min %g median %g max %g", 1e3 * seconds->min, 1e3 * seconds->median, 1e3 * seconds->max);
+    if (seconds->lower_quartile > 0)
+        json_addf(json, "lower_quartile %g upper_quartile %g", 1e3 * seconds->lower_quartile,
+                  1e3 * seconds->upper_quartile);
+    json_count(json, "runs", seconds->count);
+    json_end(json);
+}
+
+static void cell_json(Json *json, const SideBySide *side, size_t row, size_t index)
+{
+    const SideCell *cell = side_cell(side, row, index);
+    const RowComparison *comparison = &cell->comparison;
+    json_begin_object(json, NULL);
+    json_addf(json, "report %s", (char[]){report_letter(index), '\0'});
+    if (!cell->row || cell->row->failure[0] != '\0')
+        unavailable_json(json, cell->row ? cell->row->failure : "no such row");
+    if (cell->row) {
+        json_count(json, "lanes", cell->row->key.lanes);
+        times_summary_json(json, "frame_ms", &cell->row->frame);
+        times_summary_json(json, "kernel_ms", &cell->row->kernel);
+        if (cell->row->rays_per_second > 0)
+            json_number(json, "mrays_per_s", 1e-6 * cell->row->rays_per_second);
+    }
+    if (cell->kernel_ratio > 0) json_number(json, "kernel_ratio", cell->kernel_ratio);
+    if (cell->ratio > 0 && comparison->why_not)
+        json_addf(json, "comparison {ratio %g why_not %s}", cell->ratio, comparison->why_not);
+    else if (cell->ratio > 0)
+        comparison_json(json, comparison);
+    json_end(json);
+}
+
+static void row_json(Json *json, const SideBySide *side, size_t row)
+{
+    json_begin_object(json, NULL);
+    key_json(json, &side_first(side, row)->row->key);
+    json_begin_array(json, "cells");
+    for (size_t i = 0; i < side->report_count; i++)
+        cell_json(json, side, row, i);
+    json_end(json);
+    json_end(json);
+}
+
+// Returns what the page draws and the text lists. The caller closes it.
+static Json *side_by_side_json(const SideBySide *side)
+{
+    Json *json = json_open();
+    json_addf(json, "confidence %g tolerance %g", comparison_confidence, baseline_tolerance);
+    json_begin_array(json, "reports");
+    for (size_t i = 0; i < side->report_count; i++)
+        report_json(json, &side->reports[i]);
+    json_end(json);
+    json_begin_array(json, "rows");
+    for (size_t row = 0; row < side->row_count; row++)
+        row_json(json, side, row);
+    json_end(json);
+    return json;
+}
+
+static void report_print(const SideBySide *side, size_t index)
+{
+    const SideReport *report = &side->reports[index];
+    const Baseline *baseline = report->baseline;
+    printf("%c  %s: %s, glint %s", report_letter(index), report->path, baseline->date, baseline->version);
+    if (baseline->commit[0] != '\0') printf(", commit %.12s", baseline->commit);
+    printf("\n   %s%s%s%s, %s %s", baseline->device, baseline->board[0] != '\0' ? " (" : "", baseline->board,
+           baseline->board[0] != '\0' ? ")" : "", baseline->platform, baseline->driver);
+    if (baseline->host[0] != '\0') printf(", host %s", baseline->host);
+    printf("\n   %zu row%s", baseline->count, text_plural(baseline->count));
+    if (index > 0) printf(", %zu with times in A and here", report->ratio_count);
+    if (report->ratio_count > 0) printf(": %.3g times A's frame time (geometric mean)", report->mean_ratio);
+    for (size_t verdict = VERDICT_FASTER + 1; verdict-- > 0;)
+        if (report->verdicts[verdict] > 0)
+            printf(", %zu %s", report->verdicts[verdict], verdict_names[verdict]);
+    putchar('\n');
+    if (report->why_not) printf("   no verdicts, since %s\n", report->why_not);
+}
+
+static void side_notes(const void *context, size_t index, Text *notes)
+{
+    const SideBySide *side = context;
+    const SideCell *cell = &side->cells[index];
+    if (cell->ratio > 0 && cell->comparison.why_not && !side->reports[index % side->report_count].why_not)
+        text_appendf(notes, "    no verdict, since %s\n", cell->comparison.why_not);
+}
+
+static void side_by_side_print(const SideBySide *side)
+{
+    for (size_t i = 0; i < side->report_count; i++)
+        report_print(side, i);
+    report_output(side_by_side_json(side), &(ReportOptions){.table = &side_table}, side_notes, side);
+}
+
 // Returns whether the page would replace one of the reports, with a message.
 static bool page_overwrites(const char *page, char *const *paths, size_t count, MessageList *messages)
 {
@@ -154,11 +316,9 @@ static bool page_overwrites(const char *page, char *const *paths, size_t count, 
 
 static bool page_write(const SideBySide *side, const char *path, MessageList *messages)
 {
-    Text page = {0};
+    OwnedText page = {0};
     page_append(&page, "side.html", side_by_side_json(side), NULL);
-    const bool is_written = output_write_file(path, page.items, page.count, messages);
-    text_free(&page);
-    return is_written;
+    return output_write_file(path, page.items, page.count, messages);
 }
 
 int side_by_side_run(char *const *paths, size_t count, const char *page)
