@@ -173,7 +173,7 @@ def find_icd(name):
 
 
 def has_device(**options):
-    return re.search("^[0-9]", run("devices", **options).stdout, re.MULTILINE) is not None
+    return re.search("^ *[0-9]", run("devices", **options).stdout, re.MULTILINE) is not None
 
 
 # Environments with PoCL alone, and with its device twice.

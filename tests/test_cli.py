@@ -274,7 +274,7 @@ class Reports(TestCase):
         self.assertNotIn("warning", self.glint("check far.yaml").stderr)
 
     def test_devices(self):
-        self.assertRegex(self.glint("devices").stdout, r"(?m)^0\*? ")
+        self.assertRegex(self.glint("devices").stdout, r"(?m)^ *0  ")
         self.assertTrue(self.json("devices --json")["devices"])
 
 

@@ -25,6 +25,8 @@ HAS_DOUBLE = need_device()["fp64"]
 COMMANDS = {
     "bench": (f"bench s.yaml {SMALL} --seconds 0.05 --no-build-times --samples 1,2", ["runs"], 8,
               {"precision": ("precision",), "samples": ("samples",), "frame ms": ("frame_ms", "median"), "runs": ("frame_ms", "runs")}),
+    "devices": ("devices", ["devices"], 1,
+                {"device": ("index",), "name": ("name",), "default": ("default",), "exact div": ("correctly_rounded_divide_sqrt",)}),
     "verify": ("verify S1 P4 --precision single", ["precisions", "cases"], 3,
                {"case": ("name",), "passed": ("passed",), "rays": ("rays",), "worst": ("worst",)}),
 }

@@ -7,7 +7,6 @@
 #include "host/cli/open_device.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/cli/table.h"
 #include "host/opencl/device.h"
 #include <inttypes.h>
 #include <stdio.h>
@@ -21,12 +20,23 @@ typedef struct {
 static const Option command_options[] = {
     {"probe", NULL, "measure the arithmetic now", option_flag, offsetof(DevicesOptions, probes)}};
 
+static const ResultTable devices_table = {
+    .command = "devices",
+    .rows = "devices",
+    .names = {"device=index"},
+    .values = {"name", "default", "type", "units", "MHz=clock_mhz", "lanes", "fp64", "fma",
+               "exact div=correctly_rounded_divide_sqrt", "memory=memory_bytes",
+               "buffer=largest_buffer_bytes", "platform", "driver", "board", "PCI=pci"},
+    .extras = {"twin", "unusable because=unusable_because", "uuid", "vendor", "version"},
+    .is_one_table = true,
+};
+
 static const CommandLine command_line = {
     .command = "devices",
     .usage = "usage: glint devices [OPTIONS]\n\n"
-             "Lists every OpenCL device of every platform; * marks the default. Then prints\n"
-             "what the arithmetic of each device really does, if that was measured.\n",
-    .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(keep_kernels_option)}};
+             "Lists every OpenCL device of every platform. Then prints what the arithmetic of each device\n"
+             "really does, if that was measured.\n",
+    .groups = {OPTIONS(command_options), OPTIONS(keep_kernels_option), REPORT_OPTIONS}};
 
 static void device_json(Json *json, const Device *device, bool is_default)
 {
@@ -59,7 +69,7 @@ static void device_json(Json *json, const Device *device, bool is_default)
     json_end(json);
 }
 
-static void devices_print_json(const DeviceList *list, const Device *chosen)
+static Json *devices_json(const DeviceList *list, const Device *chosen)
 {
     Json *json = report_json_open(1, NULL);
     json_addf(json, "platforms %u platforms_without_device %u", list->platform_count,
@@ -67,39 +77,29 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
     json_begin_array(json, "devices");
     for (size_t i = 0; i < list->count; i++)
         device_json(json, &list->items[i], &list->items[i] == chosen);
-    json_print(json, stdout);
+    json_end(json);
+    return json;
 }
 
-static void row_append(Text *rows, const Device *device, bool is_chosen)
+static void device_notes(const void *context, size_t index, Text *notes)
 {
+    const Device *device = &((const DeviceList *)context)->items[index];
     const char *why;
-    text_appendf(rows, "%u%s\t%s\t%s\t%u\t%u\t%u\t%s\t%s\t%s\t", device->index, is_chosen ? "*" : "",
-                 device->name, device_type_name(device->type), device->compute_units, device->clock_mhz,
-                 device_lanes(device, false, 0), device->fp64 ? "yes" : "no",
-                 device->fma_in_hardware ? "yes" : "no", device->correctly_rounded ? "exact" : "loose");
-    for (size_t i = 0; i < 2; i++) {
-        const uint64_t bytes = i == 0 ? device->memory_bytes : device->largest_buffer_bytes;
-        text_appendf(rows, "%s\t", bytes > 0 ? text_size((double)bytes).text : "unknown");
-    }
-    text_appendf(rows, "%s, %s", device->platform_name, device->driver);
-    if (device->board[0]) text_appendf(rows, "; %s", device->board);
-    if (device->pci[0]) text_appendf(rows, "; PCI %s", device->pci);
-    if (device->same_name_index) text_appendf(rows, "; twin %u", device->same_name_index);
-    if (!device_usable(device, &why)) text_appendf(rows, "; unusable: %s", why);
-    text_appendf(rows, "\n");
+    if (device->same_name_index > 0) text_appendf(notes, "    twin %u\n", device->same_name_index);
+    if (!device_usable(device, &why)) text_appendf(notes, "    unusable: %s\n", why);
 }
 
-static void devices_print_table(const DeviceList *list, const Device *chosen)
+// Prints and writes the report as the options ask. Returns false with a message if the file cannot be
+// written.
+static bool devices_print(const DeviceList *list, const Device *chosen, const ReportOptions *report)
 {
-    Text rows = {0};
-    text_appendf(&rows,
-                 "\tname\ttype\tunits\tMHz\tlanes\tfp64\tfma\tdivide\tmemory\tbuffer\tplatform, driver\n");
-    for (size_t i = 0; i < list->count; i++)
-        row_append(&rows, &list->items[i], &list->items[i] == chosen);
-    table_print(text_c(&rows), "lllrrrlllrr", stdout);
-    text_free(&rows);
-    if (list->empty_platform_count)
+    const bool is_written = report_output(devices_json(list, chosen), report, device_notes, list);
+    if (!report_has_text(report)) return is_written;
+    if (list->empty_platform_count > 0)
         printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
+    for (size_t i = 0; i < list->count; i++)
+        passports_print(&list->items[i]);
+    return is_written;
 }
 
 // Measures the passports of the usable devices, or loads them from the cache. Returns false if a device
@@ -117,9 +117,8 @@ static bool passports_find(const DeviceList *list, bool probes)
         Compute compute;
         compute_open(&compute, device);
         if (!passports_measure(&compute)) {
-            char *failure = compute_failure_text(&compute);
+            OWNED char *failure = compute_failure_text(&compute);
             stderr_print("%s", failure);
-            free(failure);
             is_done = false;
         }
         compute_close(&compute);
@@ -129,30 +128,23 @@ static bool passports_find(const DeviceList *list, bool probes)
 
 int command_devices(int argument_count, char **arguments)
 {
-    DevicesOptions options = {0};
-    int status = command_line_read(&command_line, &options, argument_count, arguments);
+    DevicesOptions options = {.common.report.table = &devices_table};
+    const int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
 
     DeviceList list;
     device_list_open(&list, &device_warnings);
     for (size_t i = 0; i < list.count; i++)
         list.items[i].kernel_folder = options.common.driver.kernel_folder;
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
     const bool is_probed = passports_find(&list, options.probes);
-    const bool as_json = options.common.report.format == FORMAT_JSON;
-    if (as_json)
-        devices_print_json(&list, chosen);
-    else if (list.count > 0)
-        devices_print_table(&list, chosen);
-    for (size_t i = 0; i < list.count && !as_json; i++)
-        passports_print(&list.items[i]);
-    char *failure = device_list_failure_text(&list);
+    const bool is_written = devices_print(&list, chosen, &options.common.report);
+    OWNED char *failure = device_list_failure_text(&list);
     if (chosen && failure) message_warning(&messages, "%s", failure);
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
-    status = !is_probed ? EXIT_MACHINE : chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
-    free(failure);
+    const bool is_chosen = chosen != NULL;
     device_list_close(&list);
-    return status;
+    if (!is_written) return EXIT_USER;
+    return !is_probed ? EXIT_MACHINE : is_chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
 }

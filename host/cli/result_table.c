@@ -97,7 +97,11 @@ Text column_text_short(const ResultRow *row, const char *column)
 {
     Text text = {0};
     const json_t *value = column_value(row, column), *ratio = json_object_get(value, "ratio");
-    if (json_is_real(ratio ? ratio : value))
+    const char *unit = strrchr(column, '_');
+    const json_int_t bytes = json_integer_value(value);
+    if (unit && strcmp(unit, "_bytes") == 0)
+        text_appendf(&text, "%s", bytes > 0 ? text_size((double)bytes).text : "unknown");
+    else if (json_is_real(ratio ? ratio : value))
         number_append_short(&text, json_real_value(ratio ? ratio : value));
     else
         value_append(&text, value);

@@ -50,6 +50,7 @@ ShortText column_heading(const char *column);
 const json_t *column_value(const ResultRow *row, const char *column);
 // Returns the value as a text, which is empty if there is none. The caller frees it.
 Text column_text(const ResultRow *row, const char *column);
-// Returns the value as column_text does, but a real number with about four digits.
+// Returns the value as column_text does, but a real number with about four digits, and the size of a path
+// that ends in "_bytes" in the unit that suits it, or "unknown" for 0.
 Text column_text_short(const ResultRow *row, const char *column);
 void value_append(Text *text, const json_t *value);
