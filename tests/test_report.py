@@ -3,6 +3,8 @@
 rejects kernels.
 
 run_tests: sanitize-long-only"""
+import gzip
+import io
 import json
 import os
 import re
@@ -75,6 +77,13 @@ class Report(TestCase):
         self.assertRegex(files["versions.txt"], r"(?m)^zlib +1\.")
         self.assertIn("\nCL_EXAMPLE=~/x\n", files["versions.txt"])
         self.assertFalse([name for name, text in files.items() if "not for others" in text])
+
+    def test_standard_output(self):
+        """Nothing follows the archive on standard output."""
+        command = [PROGRAM, *SMALL.replace("r.tar.gz", "-").split()]
+        out = subprocess.run(command, env=os.environ | self.env, capture_output=True, check=True).stdout
+        with tarfile.open(fileobj=io.BytesIO(gzip.decompress(out))) as archive:
+            self.assertEqual(archive.getnames()[0], "index.txt")
 
     def test_rejected_kernels(self):
         """The index names the steps that fail, and the logs say why. The root folder is not replaced by ~."""

@@ -304,7 +304,8 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
         status = count > 0 ? EXIT_DONE : EXIT_USER;
         messages_print(&messages, NULL);
         text_free(&lines);
-        if (status == EXIT_DONE) printf("%s: %zu files\n", choice->output, count);
+        if (status == EXIT_DONE && strcmp(choice->output, "-") != 0)
+            printf("%s: %zu files\n", choice->output, count);
     }
     for (size_t i = 0; i < STEP_COUNT; i++)
         free(results[i].failure);
