@@ -15,7 +15,7 @@ import tarfile
 import time
 import unittest
 
-from glint import IS_SANITIZED, PROGRAM, TestCase, faults, main, need_device
+from glint import IS_SANITIZED, PROGRAM, TestCase, faults, main, need_device, write
 
 need_device()
 SMALL = "report S1 --precision single --lanes 1 -o r.tar.gz"
@@ -84,6 +84,14 @@ class Report(TestCase):
         out = subprocess.run(command, env=os.environ | self.env, capture_output=True, check=True).stdout
         with tarfile.open(fileobj=io.BytesIO(gzip.decompress(out))) as archive:
             self.assertEqual(archive.getnames()[0], "index.txt")
+
+    def test_tar_fails(self):
+        os.mkdir("bin")
+        write("bin/tar", "#!/bin/sh\necho unusual >&2\nexit 2\n")
+        os.chmod("bin/tar", 0o755)
+        path = f"{os.path.abspath('bin')}:{os.environ['PATH']}"
+        self.assertIn("error: tar cannot write the archive: exit status 2: unusual\n", self.glint(SMALL, 1, env=self.env | {"PATH": path}).stderr)
+        self.assertEqual((os.listdir("temporary"), os.path.exists("r.tar.gz")), ([], False))
 
     def test_rejected_kernels(self):
         """The index names the steps that fail, and the logs say why. The root folder is not replaced by ~."""

@@ -3,12 +3,12 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/exit_status.h"
+#include "host/base/output.h"
 #include "host/cli/commands.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_archive.h"
-#include "host/cli/report_versions.h"
 #include "host/cli/side_by_side.h"
 #include "host/cli/variants.h"
 #include <errno.h>
@@ -129,6 +129,7 @@ typedef struct {
     const char *name, *prints;
     const char *arguments[STEP_ARGUMENTS_MAX];
     bool has_options, has_cases; // whether the user's options and cases follow
+    const char *program;         // NULL for glint
 } Step;
 
 #define KEEP_KERNELS "--keep-kernels", "kernels"
@@ -143,6 +144,12 @@ static const Step steps[] = {
      false},
 };
 enum { STEP_COUNT = COUNT_OF(steps) };
+
+static const Step archive_step = {"archive",
+                                  "tar.gz",
+                                  {"--create", "--file=-", "--gzip", "--owner=0", "--group=0",
+                                   "--numeric-owner", "--mode=644", "--files-from", REPORT_NAMES},
+                                  .program = "tar"};
 
 typedef struct {
     double seconds;
@@ -164,25 +171,23 @@ static void folder_remove(const char *path)
 
 // Creates the folder in which the steps run. The caller removes and frees it. Returns NULL with a message on
 // failure.
-static char *steps_folder_create(void)
+static char *steps_folder_create(MessageList *messages)
 {
     const char *parent = getenv("TMPDIR");
     char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
     if (mkdtemp(folder)) return folder;
-    stderr_print("cannot create the folder '%s': %s", folder, strerror(errno));
+    message_error(messages, "cannot create the folder '%s': %s", folder, strerror(errno));
     free(folder);
     return NULL;
 }
 
-// Writes the scene that glint bench renders. Returns false with a message on failure.
-static bool scene_write(const char *folder)
+// Writes the versions and the scene that glint bench renders. Returns false with a message on failure.
+static bool inputs_write(const char *folder, MessageList *messages)
 {
-    MessageList messages = {0};
-    char *path = text_format("%s/scene.yaml", folder);
-    const bool is_written = output_write_file(path, scene_text, sizeof scene_text - 1, &messages);
-    messages_print(&messages, NULL);
-    free(path);
-    return is_written;
+    OwnedText versions = report_versions(), scene = {0};
+    text_append(&scene, scene_text, sizeof scene_text - 1);
+    return report_file_write(folder, "versions.txt", &versions, messages) &&
+           report_file_write(folder, "scene.yaml", &scene, messages);
 }
 
 // Places the steps' temporary files and kernel caches in the folder. The caches are empty, so every kernel
@@ -192,6 +197,7 @@ static void variables_set(const char *folder)
     static const char *const variables[] = {"XDG_CACHE_HOME", "POCL_CACHE_DIR", "TMPDIR"};
     for (size_t i = 0; i < COUNT_OF(variables); i++)
         setenv(variables[i], folder, true);
+    unsetenv("TAR_OPTIONS");
 }
 
 // Waits for a step's process. Returns false if it had to be stopped, at the time limit or by an interrupt.
@@ -223,18 +229,18 @@ static char *status_failure(int status)
 static int step_start(const Step *step, const ReportChoice *choice, const char *folder, pid_t *process)
 {
     char name[] = "glint";
-    char **arguments = memory_allocate_zeroed(
+    OWNED char **arguments = memory_allocate_zeroed(
         1 + STEP_ARGUMENTS_MAX + PASSED_MAX + choice->operands.count + 1, sizeof *arguments);
     size_t count = 0;
-    arguments[count++] = name;
+    arguments[count++] = step->program ? (char *)step->program : name;
     for (size_t i = 0; step->arguments[i]; i++)
         arguments[count++] = (char *)step->arguments[i];
     for (size_t i = 0; step->has_options && i < choice->passed_count; i++)
         arguments[count++] = choice->passed[i];
     for (size_t i = 0; step->has_cases && i < choice->operands.count; i++)
         arguments[count++] = choice->operands.items[i];
-    char *output = text_format("%s/%s.%s", folder, step->name, step->prints),
-         *messages = text_format("%s/%s.log", folder, step->name);
+    OWNED char *output = text_format("%s/%s.%s", folder, step->name, step->prints),
+               *messages = text_format("%s/%s.log", folder, step->name);
     posix_spawn_file_actions_t actions;
     int error = posix_spawn_file_actions_init(&actions);
     if (!error) {
@@ -242,12 +248,10 @@ static int step_start(const Step *step, const ReportChoice *choice, const char *
         posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output, O_WRONLY | O_CREAT, 0600);
         posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT, 0600);
         posix_spawn_file_actions_addchdir_np(&actions, folder);
-        error = posix_spawn(process, "/proc/self/exe", &actions, NULL, arguments, environ);
+        error = posix_spawnp(process, step->program ? step->program : "/proc/self/exe", &actions, NULL,
+                             arguments, environ);
         posix_spawn_file_actions_destroy(&actions);
     }
-    free(output);
-    free(messages);
-    free(arguments);
     return error;
 }
 
@@ -283,35 +287,50 @@ static Text results_text(const StepResult *results, MessageList *messages)
     return text;
 }
 
+// Archives the files of the folder. Returns their number, or 0 with a message on failure.
+static size_t archive_write(const ReportChoice *choice, const char *folder, const char *lines,
+                            OutputFile *output, Progress *progress, MessageList *messages)
+{
+    Scrubber scrubber = scrubber_open(folder);
+    const size_t count = report_files_prepare(folder, &scrubber, lines, messages);
+    scrubber_close(&scrubber);
+    if (count == 0) return 0;
+    OWNED char *failure = step_run(&archive_step, choice, folder, progress, 1).failure;
+    OWNED char *path = text_format("%s/archive.tar.gz", folder);
+    OWNED char *log_path = text_format("%s/archive.log", folder);
+    OwnedText archive = {0}, log = {0};
+    if (failure && !is_interrupted()) {
+        if (text_read_file(&log, log_path, messages) && log.count > 0) log.items[log.count - 1] = '\0';
+        message_error(messages, "tar cannot write the archive: %s%s%s", failure, log.count > 0 ? ": " : "",
+                      text_c(&log));
+    }
+    const bool is_written = !failure && text_read_file(&archive, path, messages) &&
+                            output_write(output, archive.items, archive.count, messages) &&
+                            output_commit(output, messages);
+    return is_written ? count : 0;
+}
+
 // Runs the steps and writes the archive. Returns the exit status.
-static int report_make(const ReportChoice *choice, const char *folder, OutputFile *output)
+static int report_make(const ReportChoice *choice, const char *folder, OutputFile *output,
+                       MessageList *messages)
 {
     Progress progress;
     StepResult results[STEP_COUNT] = {0};
-    Scrubber scrubber = scrubber_open(folder);
-    Text versions = report_versions(&scrubber);
     variables_set(folder);
     progress_open(&progress, false);
     for (size_t i = 0; i < STEP_COUNT && !is_interrupted(); i++)
         results[i] = step_run(&steps[i], choice, folder, &progress, (double)i / STEP_COUNT);
-    progress_close(&progress);
-    int status = EXIT_INTERRUPTED;
+    size_t count = 0;
     if (!is_interrupted()) {
-        MessageList messages = {0};
-        Text lines = results_text(results, &messages);
-        const size_t count =
-            report_archive_write(output, folder, &scrubber, &versions, text_c(&lines), &messages);
-        status = count > 0 ? EXIT_DONE : EXIT_USER;
-        messages_print(&messages, NULL);
-        text_free(&lines);
-        if (status == EXIT_DONE && strcmp(choice->output, "-") != 0)
-            printf("%s: %zu files\n", choice->output, count);
+        OwnedText lines = results_text(results, messages);
+        count = archive_write(choice, folder, text_c(&lines), output, &progress, messages);
     }
+    progress_close(&progress);
     for (size_t i = 0; i < STEP_COUNT; i++)
         free(results[i].failure);
-    text_free(&versions);
-    scrubber_close(&scrubber);
-    return status;
+    if (count == 0) return is_interrupted() ? EXIT_INTERRUPTED : EXIT_USER;
+    if (strcmp(choice->output, "-") != 0) printf("%s: %zu files\n", choice->output, count);
+    return EXIT_DONE;
 }
 
 // Opens the archive, runs the steps and writes it. Returns the exit status.
@@ -322,13 +341,12 @@ static int archive_make(ReportChoice *choice)
     OutputFile output;
     MessageList messages = {0};
     const bool is_open = output_open(&output, choice->output, &messages);
-    messages_print(&messages, NULL);
-    if (!is_open) return EXIT_USER;
-    char *folder = steps_folder_create();
-    const int status = folder && scene_write(folder) ? report_make(choice, folder, &output) : EXIT_MACHINE;
+    OWNED char *folder = is_open ? steps_folder_create(&messages) : NULL;
+    int status = is_open ? EXIT_MACHINE : EXIT_USER;
+    if (folder && inputs_write(folder, &messages)) status = report_make(choice, folder, &output, &messages);
     if (folder) folder_remove(folder);
-    free(folder);
-    if (status != EXIT_DONE) output_abandon(&output);
+    if (is_open && status != EXIT_DONE) output_abandon(&output);
+    messages_print(&messages, NULL);
     return status;
 }
 
