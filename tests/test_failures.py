@@ -55,6 +55,9 @@ class Failures(TestCase):
         with open("/dev/full", "w", encoding="utf-8") as full:
             errors = self.glint("trace sphere.yaml --rays rays", status=2, stdout=full).stderr
         self.assertEqual(errors.count("\n"), 1)
+        # the report is longer than a buffer
+        errors = self.glint("devices --probe --format json --output /dev/full", status=1).stderr
+        self.assertEqual(errors, "glint: error: cannot write '/dev/full': No space left on device\n")
 
     def test_limit_on_the_size_of_files(self):
         self.glint("render sphere.yaml --size 1000x1000 --quiet -o warm.png")  # the kernel is in the cache then

@@ -83,9 +83,8 @@ const char *report_options_check(void *common)
 static void name_append(Text *text, const ResultRow *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; table->names[i]; i++) {
-        Text value = column_text(row, table->names[i]);
+        OwnedText value = column_text(row, table->names[i]);
         if (value.count > 0 || i == 0) text_appendf(text, "%s%s", i > 0 ? between : "", text_c(&value));
-        text_free(&value);
     }
 }
 
@@ -97,11 +96,9 @@ static RowOutcome row_outcome(const ResultRow *row, const ResultTable *table)
     const json_t *verdict = NULL;
     for (size_t i = 0; i < 2 && table->verdicts[i] && !verdict; i++)
         verdict = member_at(row->sources[0], table->verdicts[i]);
-    Text text = {0};
+    OwnedText text = {0};
     value_append(&text, verdict);
-    const RowOutcome outcome = verdict && strcmp(text_c(&text), table->failed) == 0 ? ROW_FAILED : ROW_PASSED;
-    text_free(&text);
-    return outcome;
+    return verdict && strcmp(text_c(&text), table->failed) == 0 ? ROW_FAILED : ROW_PASSED;
 }
 
 // A character that a format reserves, and its replacement. A newline stands for all control characters, which
@@ -143,12 +140,11 @@ static void csv_row(Writing *writing, const ResultRow *row)
 {
     const char *column;
     for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
-        Text value = column_text(row, column);
+        OwnedText value = column_text(row, column);
         const char *quote = strpbrk(text_c(&value), ",\"\r\n") ? "\"" : "";
         text_appendf(&writing->body, "%s%s", i > 0 ? "," : "", quote);
         escaped_append(&writing->body, text_c(&value), csv_escapes);
         text_appendf(&writing->body, "%s", quote);
-        text_free(&value);
     }
     text_appendf(&writing->body, "\n");
 }
@@ -157,11 +153,10 @@ static void markdown_row(Writing *writing, const ResultRow *row)
 {
     const char *column;
     for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
-        Text value = column_text_short(row, column);
+        OwnedText value = column_text_short(row, column);
         text_appendf(&writing->body, "| ");
         escaped_append(&writing->body, text_c(&value), markdown_escapes);
         text_appendf(&writing->body, " ");
-        text_free(&value);
     }
     text_appendf(&writing->body, "|\n");
 }
@@ -171,17 +166,17 @@ static void details_append(Text *text, const ResultRow *row, const ResultTable *
 {
     const size_t start = text->count;
     for (size_t i = 0; table->values[i]; i++) {
-        Text value = column_text(row, table->values[i]);
+        OwnedText value = column_text(row, table->values[i]);
         if (value.count > 0)
             text_appendf(text, "%s%s %s", text->count > start ? ", " : "",
                          column_heading(table->values[i]).text, text_c(&value));
-        text_free(&value);
     }
 }
 
 static void junit_row(Writing *writing, const ResultRow *row)
 {
-    Text name = {0}, details = {0}, *body = &writing->body;
+    OwnedText name = {0}, details = {0};
+    Text *body = &writing->body;
     name_append(&name, row, writing->table, " ");
     const RowOutcome outcome = row_outcome(row, writing->table);
     writing->counts[outcome]++;
@@ -197,15 +192,13 @@ static void junit_row(Writing *writing, const ResultRow *row)
                  outcome == ROW_FAILED ? "failure" : "skipped");
     escaped_append(body, text_c(&details), xml_escapes);
     text_appendf(body, outcome == ROW_PASSED ? "</system-out>\n  </testcase>\n" : "\"/>\n  </testcase>\n");
-    text_free(&details);
-    text_free(&name);
 }
 
 // Writes one entry per run, as google/benchmark does with repetitions, so that its tools compare
 // distributions. The times are milliseconds; its compare.py prints no decimals, hence microseconds.
 static void benchmark_row(Writing *writing, const ResultRow *row)
 {
-    Text name = {0};
+    OwnedText name = {0};
     name_append(&name, row, writing->table, "/");
     const json_t *times = value_at(row, writing->table->times),
                  *processor =
@@ -214,18 +207,15 @@ static void benchmark_row(Writing *writing, const ResultRow *row)
     for (size_t i = 0; i < count; i++) {
         const double time = json_number_value(json_is_number(times) ? times : json_array_get(times, i));
         const json_t *of_processor = json_array_get(processor, i);
-        json_t *entry = json_pack(
+        json_auto_t *entry = json_pack(
             "{s:s, s:s, s:s, s:I, s:i, s:i, s:i, s:f, s:f, s:s}", "name", text_c(&name), "run_name",
             text_c(&name), "run_type", "iteration", "repetitions", (json_int_t)count, "repetition_index",
             (int)i, "threads", 1, "iterations", 1, "real_time", 1e3 * time, "cpu_time",
             1e3 * (of_processor ? json_number_value(of_processor) : time), "time_unit", "us");
-        char *dumped = entry ? json_dumps(entry, JSON_COMPACT) : NULL;
+        OWNED char *dumped = entry ? json_dumps(entry, JSON_COMPACT) : NULL;
         if (!dumped) fault("out of memory: JSON");
         text_appendf(&writing->body, "%s    %s", writing->row_count++ > 0 ? ",\n" : "", dumped);
-        free(dumped);
-        json_decref(entry);
     }
-    text_free(&name);
 }
 
 static void rows_write(Writing *writing, RowWriter *write)
@@ -273,16 +263,14 @@ static void document_write(Writing *writing, ReportFormat format, Text *text)
         break;
     case FORMAT_BENCHMARK: {
         rows_write(writing, benchmark_row);
-        json_t *context =
+        json_auto_t *context =
             json_pack("{s:O?, s:O?, s:O?, s:s, s:O?}", "date", json_object_get(document, "date"), "host_name",
                       member_at(document, "host.name"), "num_cpus", member_at(document, "host.processors"),
                       "executable", "glint", "device", member_at(document, "device.name"));
-        char *dumped = context ? json_dumps(context, JSON_COMPACT) : NULL;
+        OWNED char *dumped = context ? json_dumps(context, JSON_COMPACT) : NULL;
         if (!dumped) fault("out of memory: JSON");
         text_appendf(text, "{\n  \"context\": %s,\n  \"benchmarks\": [\n", dumped);
         text_appendf(&writing->body, "\n  ]\n}\n");
-        free(dumped);
-        json_decref(context);
         break;
     }
     default:
@@ -301,40 +289,37 @@ static json_t *document_load(const Text *document)
 // Writes a document in the options' format, which is not FORMAT_TEXT.
 static bool document_output(const Text *document, const ReportOptions *options)
 {
-    Text text = {0};
+    OwnedText text = {0};
     if (options->format != FORMAT_JSON) {
-        Writing writing = {.table = options->table, .document = document_load(document)};
+        json_auto_t *loaded = document_load(document);
+        Writing writing = {.table = options->table, .document = loaded};
         document_write(&writing, options->format, &text);
         text_free(&writing.body);
-        json_decref((json_t *)writing.document);
     }
     const Text *written = options->format == FORMAT_JSON ? document : &text;
+    if (!options->output) {
+        fwrite(text_c(written), 1, written->count, stdout); // main reports a failure
+        return true;
+    }
     MessageList messages = {0};
-    if (!options->output) output_open(&report_file, "-", &messages);
-    fwrite(text_c(written), 1, written->count, report_file.file);
-    const bool is_written = output_commit(&report_file, &messages);
+    const bool is_written = output_write(&report_file, text_c(written), written->count, &messages) &&
+                            output_commit(&report_file, &messages);
     messages_print(&messages, NULL);
-    text_free(&text);
     return is_written;
 }
 
 bool report_write(Json *json, const ReportOptions *options)
 {
-    Text document = json_close(json);
-    const bool is_written = document_output(&document, options);
-    text_free(&document);
-    return is_written;
+    OwnedText document = json_close(json);
+    return document_output(&document, options);
 }
 
 bool report_output(Json *json, const ReportOptions *options, RowNotes *notes, const void *context)
 {
-    Text document = json_close(json);
+    OwnedText document = json_close(json);
     if (report_has_text(options)) {
-        json_t *loaded = document_load(&document);
+        json_auto_t *loaded = document_load(&document);
         result_text_print(loaded, options->table, notes, context, stdout);
-        json_decref(loaded);
     }
-    const bool is_written = !report_has_document(options) || document_output(&document, options);
-    text_free(&document);
-    return is_written;
+    return !report_has_document(options) || document_output(&document, options);
 }

@@ -80,9 +80,8 @@ static void plain_append(Text *text, const char *from)
 // Appends a value, of which the empty text shows as "".
 static void value_append_plain(Text *text, const ResultRow *row, const char *column)
 {
-    Text value = column_text_short(row, column);
+    OwnedText value = column_text_short(row, column);
     plain_append(text, value.count > 0 ? text_c(&value) : "\"\"");
-    text_free(&value);
 }
 
 static void columns_choose(RowGroup *group)
