@@ -107,8 +107,8 @@ static bool variants_read(const Option *option, void *bench_options)
 static const Option command_options[] = {
     {"against", "GLINT", "compare with another build, run alternately (default of --seconds: 30 per row)",
      option_text, offsetof(BenchOptions, against)},
-    {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
-     offsetof(BenchOptions, baseline)},
+    {"compare", "FILE", "compare with an earlier report (--json); less conclusive than --against",
+     option_text, offsetof(BenchOptions, baseline)},
     {"tolerance", "R",
      "ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 with --compare)",
      option_number, offsetof(BenchOptions, tolerance), NUMBERS(1, INFINITY)},

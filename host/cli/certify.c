@@ -81,12 +81,12 @@ static void certified_append(Text *notes, const CertifyErrors *errors, const Cer
                      "differ from it\n",
                      errors->unconfirmed, text_plural(errors->unconfirmed), errors->contradicted);
     if (uncertified->count == 0) return;
-    text_appendf(notes,
-                 "    %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
-                 "are within 2^-49, %zu neither\n",
-                 uncertified->count, text_plural(uncertified->count), uncertified->examined,
-                 uncertified->witnessed, uncertified->close,
-                 uncertified->examined - uncertified->witnessed - uncertified->close);
+    text_appendf(
+        notes,
+        "    %zu pixel%s uncertified; of the %zu that were examined, %zu change if errors of 2^-50 are "
+        "added, %zu lie within 2^-49 of a boundary, and %zu do neither\n",
+        uncertified->count, text_plural(uncertified->count), uncertified->examined, uncertified->witnessed,
+        uncertified->close, uncertified->examined - uncertified->witnessed - uncertified->close);
 }
 
 static void certify_notes(const void *context, size_t row, Text *notes)

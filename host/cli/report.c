@@ -104,13 +104,13 @@ static const char *options_check(void *report_choice)
 
 static const CommandLine command_line = {
     .command = "report",
-    .usage =
-        "usage: glint report [CASE...] [OPTIONS]\n"
-        "       glint report REPORT.json... [--html FILE]\n\n"
-        "Writes an archive for a bug report: what glint devices, its passports, glint verify --quick and "
-        "a small glint bench\nprint, the text and build log of every kernel, and versions. All kernels "
-        "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
-        "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
+    .usage = "usage: glint report [CASE...] [OPTIONS]\n"
+             "       glint report REPORT.json... [--html FILE]\n\n"
+             "Writes an archive for a bug report: the output of glint devices, its passports, glint verify "
+             "--quick "
+             "and a small\nglint bench, the text and build log of every kernel, and versions. All kernels "
+             "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
+             "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
     .groups = {OPTIONS(archive_options),
                OPTIONS(command_precision),
                OPTIONS(device_option),
