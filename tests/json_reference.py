@@ -47,7 +47,7 @@ is the program's version, and
 .B device
 has the name, platform, driver, passports and other members of
 .BR "glint devices" .
-.BR doubt " and " clock_doubt
+.BR fault " and " clock_fault
 appear where the device's clock is not trusted, and state the reason.
 """
 TAIL = """\
@@ -142,7 +142,7 @@ MEANINGS = {
     "precisions[].color.bound": "number; that `certified` keeps",
     "precisions[].color.{max_right,max_wrong}": "number; where nothing is wrong, and where something is",
     "precisions[].color.{x,y}": "count; the pixel of the larger",
-    "precisions[].wrong_decided": "count; at `certified`: wrong pixels that are not uncertified, contradicted ones among them",
+    "precisions[].wrong_certified": "count; at `certified`: wrong pixels that are not uncertified, contradicted ones among them",
     "precisions[].claim": "text; `kept` or `broken`; at `certified`",
     "precisions[].unconfirmed": "count; at `certified`: pixels that it decides and the reference does not",
     "precisions[].contradicted": "count; of these, whose answer differs from the reference's",
@@ -188,7 +188,7 @@ MEANINGS = {
     "{launches[],read_backs[]}.global": "count; work-items in each dimension",
     "{launches[],read_backs[]}.local": "count; work-items of a group in each dimension",
     "build_options": "text; that the kernels were compiled with",
-    "{launches[],read_backs[]}.doubt": "text; why the device's clock is not trusted",
+    "{launches[],read_backs[]}.fault": "text; why the device's clock is not trusted",
     # check
     "valid": "boolean; if not, only the messages follow",
     "objects": "count; a mesh is one",
@@ -268,7 +268,7 @@ MEANINGS = {
     "heatmap.{white,black}": "number; the differences shown white and black",
     # bench
     "clock": "text; `event` (the device's) or `host`",
-    "clock_doubt": "text; why the device's clock is not trusted",
+    "clock_fault": "text; why the device's clock is not trusted",
     "runs[]": "object; a row",
     "status": "text; `unavailable`",
     "reason": "text; why not measured",

@@ -158,7 +158,7 @@ class Certify(TestCase):
         """Colored transmission has bounds, so that what is decided is right at every precision."""
         for name, row in self.certify_filters("").items():
             if name == "certified":
-                self.assertEqual((row["wrong_decided"], row["uncertified"]["pixels"]), (0, 0))
+                self.assertEqual((row["wrong_certified"], row["uncertified"]["pixels"]), (0, 0))
             else:
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
@@ -175,7 +175,7 @@ class Certify(TestCase):
         self.assertEqual(images[2], images[3])
         self.assertNotIn(images[4], (images[0], images[2]))
         for name, row in self.certify_filters("--min-contribution 0.4 --bounces 8").items():
-            wrong = row["wrong_decided"] if name == "certified" else row["wrong"]["path"] + row["wrong"]["color"]
+            wrong = row["wrong_certified"] if name == "certified" else row["wrong"]["path"] + row["wrong"]["color"]
             self.assertEqual(wrong, 0, name)
         for wrong in "2", "-1", "some", "nan":
             self.refuses(f"render scene.yaml --min-contribution={wrong}", "expected a number from 0 to 1")
@@ -186,7 +186,7 @@ class Certify(TestCase):
         write("mirrors.yaml", MIRRORS if IS_LONG else MIRRORS + OUTSIDE)
         report = self.json("certify mirrors.yaml --size 24x16 --pixels 384 --bounces 64 --precision certified --json")
         row = report["precisions"][0]
-        self.assertEqual((row["compared"], row["uncertified"]["pixels"], row["wrong_decided"]), (384, 0, 0))
+        self.assertEqual((row["compared"], row["uncertified"]["pixels"], row["wrong_certified"]), (384, 0, 0))
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_uncertified_pixels(self):
@@ -201,7 +201,7 @@ class Certify(TestCase):
         self.assertEqual({i % 33 for i in uncertified}, {16})
         self.assertEqual(report["reference_uncertain"], count)
         self.assertEqual(row["uncertified"], {"pixels": count, "examined": count, "witnessed": count, "close": 0})
-        self.assertEqual([row[name] for name in ("wrong_decided", "unconfirmed", "contradicted")], [0, 0, 0])
+        self.assertEqual([row[name] for name in ("wrong_certified", "unconfirmed", "contradicted")], [0, 0, 0])
 
     def test_refused(self):
         for arguments, pattern in ((f"{ROOT}/scenes/demo.yaml --pixels 0", "--pixels"), ("", "no scene"), ("none.yaml", "none.yaml")):

@@ -17,7 +17,7 @@ import json_reference
 from glint import BALLS, PROGRAM, ROOT, TestCase, main, need_device, preloaded, read, run, shim_build, write
 
 WRITES = "--write" in sys.argv
-RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
+RARE = {"fault", "clock_fault"}  # of a device's clock that is not trusted, which no test can bring about
 # Scenes of spheres, one point light and reflection, which share their kernels.
 PLAIN = """\
 camera: {position: [0, 1, -4], look_at: [0, 0, 0], fov: 60}
@@ -120,7 +120,7 @@ class Json(TestCase):
         for launch in launches:
             self.assertEqual(len(launch["local"]), len(launch["global"]))
             self.assertTrue(all(items > 0 and items % group == 0 for items, group in zip(launch["global"], launch["local"])))
-        trusted = [command for command in launches + reads if "doubt" not in command]
+        trusted = [command for command in launches + reads if "fault" not in command]
         names = "queued_ms", "submitted_ms", "start_ms", "end_ms"
         moments = [[command[name] for name in names if command[name] is not None] for command in trusted]
         self.assertEqual([sorted(times) for times in moments], moments)

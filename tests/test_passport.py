@@ -340,7 +340,7 @@ class PassportTest(TestCase):
                 self.assertEqual(device["refused"], [])
                 for launch in report["by_device"][0]["launches"]:
                     self.assertIsNone(launch["event_ms"])
-                    self.assertRegex(launch["doubt"], pattern.split(" but")[0])
+                    self.assertRegex(launch["fault"], pattern.split(" but")[0])
 
     def test_the_cache(self):
         """Each device and driver is measured once, unless a new measurement is requested."""

@@ -30,7 +30,7 @@ def run(milliseconds, **key):
 
 
 def report(*runs, name="cpu-x", kind="cpu", host="here", rounds=1 << 20):
-    return {"schema": 6, "glint": "0.9", "date": "2026-01-02T03:04:05Z", "host": {"name": host}, "build": {"commit": "c" * 40},
+    return {"schema": 7, "glint": "0.9", "date": "2026-01-02T03:04:05Z", "host": {"name": host}, "build": {"commit": "c" * 40},
             "device": {"name": name, "board": None, "platform": "platform-x", "driver": "driver-x", "type": kind},
             "calibration": {"rounds": rounds, "samples_ms": [3.0] * RUNS, "processor_samples_ms": [6.0] * RUNS},
             "runs": list(runs)}  # fmt: skip
@@ -118,6 +118,7 @@ class SideBySide(TestCase):
                 self.assertRegex(out, f"(?m)^ +no verdicts?, since .*{reason}")
                 self.assertRegex(out, r"(?m)  0\.5000$")
         scrubbed = report(run(10), host="HOST")  # as glint report writes it
+        self.assertIn("B  1.json: ", self.compared(older, older | {"schema": 6})[0])
         self.assertIn("the first report has another calibration or none", self.compared(uncalibrated, older)[0])
         self.assertIn("the host of one of the reports is unknown", self.compared(scrubbed, scrubbed)[0])
         self.assertNotIn("lower_quartile", self.compared(older, summarized)[1]["rows"][0]["cells"][1]["frame_ms"])
@@ -155,10 +156,11 @@ class SideBySide(TestCase):
     def test_refused(self):
         good = save("good.json", report(run(10)))
         save("old.json", report(run(10)) | {"schema": 5})
+        save("new.json", report(run(10)) | {"schema": 8})
         save("empty.json", report())
         save("hashless.json", report(run(10), run(10, scene_hash="a1")))
         write("cut.json", Path(good).read_text(encoding="utf-8")[:-9])
-        for path, reason in [("old.json", "'.* is a report with schema 5; expected 6"), ("empty.json", "'.*has no rows"),
+        for path, reason in [("old.json", "'.* is a report with schema 5; expected 6 to 7"), ("new.json", "'.* with schema 8; expected 6 to 7"), ("empty.json", "'.*has no rows"),
                              ("cut.json", r":\d+:\d+: error: not a report of glint bench --json: "),
                              ("hashless.json", "'.*row 2 has no valid scene_hash"), ("none.json", "'.*No such file")]:  # fmt: skip
             self.refuses(f"report {good} {path} --html page.html", f"{path}{reason}")
@@ -171,7 +173,7 @@ class SideBySide(TestCase):
         self.refuses(f"report {good} --html none/page.html", "none/page.html")
         self.refuses(f"report {' '.join([good] * 27)}", "at most 26")
         self.assertEqual(sorted(path.name for path in Path().iterdir()),
-                         ["cut.json", "empty.json", "good.json", "hashless.json", "old.json"])  # fmt: skip
+                         ["cut.json", "empty.json", "good.json", "hashless.json", "new.json", "old.json"])  # fmt: skip
 
     def test_names_are_escaped(self):
         name = "</script><!--<script>\"é'.yaml"

@@ -221,7 +221,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
 
 Json *accuracy_json(const AccuracyReport *report)
 {
-    Json *json = report_json_open(1, report->device);
+    Json *json = report_json_open(2, report->device);
     perturb_json(json, report->perturb_seed, report->perturb_scale);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < report->scene_count; i++)

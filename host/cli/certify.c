@@ -24,7 +24,7 @@ static const ResultTable certify_table = {
     .values = {"pixels=compared", "wrong objects=wrong.object", "wrong shadows=wrong.shadow",
                "wrong paths=wrong.path", "wrong colors=wrong.color", "error of right colors=color.max_right",
                "error of wrong colors=color.max_wrong", "margin of wrong=wrong.margin",
-               "wrong but certified=wrong_decided", "uncertified=uncertified.pixels", "claim"},
+               "wrong but certified=wrong_certified", "uncertified=uncertified.pixels", "claim"},
     .extras = {"reason"},
     .verdicts = {"claim"},
     .failed = "broken",
@@ -137,7 +137,7 @@ static void row_json(Json *json, Precision precision, const CertifyRow *row)
                   errors->wrong_color, errors->worst[0], errors->worst[1]);
     if (!row->failure && precision == PRECISION_CERTIFIED)
         json_addf(json,
-                  "wrong_decided %zu claim %s unconfirmed %zu contradicted %zu "
+                  "wrong_certified %zu claim %s unconfirmed %zu contradicted %zu "
                   "uncertified {pixels %zu examined %zu witnessed %zu close %zu}",
                   errors->violations, errors->violations > 0 ? "broken" : "kept", errors->unconfirmed,
                   errors->contradicted, uncertified->count, uncertified->examined, uncertified->witnessed,

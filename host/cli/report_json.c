@@ -152,7 +152,7 @@ void times_json(Json *json, const BenchRow *row)
     summary_json(json, "frame_ms", series_summarize(&row->times.frame));
     summary_json(json, "kernel_ms", bench_kernel(&row->times));
     json_text(json, "clock", clock_fault ? "host" : "event");
-    if (clock_fault) json_text(json, "clock_doubt", clock_fault);
+    if (clock_fault) json_text(json, "clock_fault", clock_fault);
 }
 
 void rays_json(Json *json, const BenchRow *row)

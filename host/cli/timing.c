@@ -161,7 +161,7 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
                   time->fault ? "host" : "event", time->fault ? NAN : 1e3 * time->event_seconds,
                   1e3 * time->host_seconds);
         command_json(json, report, time);
-        if (time->fault) json_text(json, "doubt", time->fault);
+        if (time->fault) json_text(json, "fault", time->fault);
         json_end(json);
     }
     json_end(json);

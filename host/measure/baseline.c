@@ -165,9 +165,10 @@ static bool schema_check(const char *path, const json_t *report, MessageList *me
     const json_t *schema = json_object_get(report, "schema");
     if (!json_is_array(json_object_get(report, "runs")) || !json_is_number(schema))
         return message_error(messages, "'%s' is not a report of glint bench --json", path);
-    return json_number_value(schema) == BENCH_SCHEMA ||
-           message_error(messages, "'%s' is a report with schema %g; expected %d: re-measure it", path,
-                         json_number_value(schema), BENCH_SCHEMA);
+    const double version = json_number_value(schema);
+    return (version >= BENCH_SCHEMA_OLDEST && version <= BENCH_SCHEMA) ||
+           message_error(messages, "'%s' is a report with schema %g; expected %d to %d: re-measure it", path,
+                         version, BENCH_SCHEMA_OLDEST, BENCH_SCHEMA);
 }
 
 static bool calibration_check(const char *path, const Baseline *baseline, MessageList *messages)

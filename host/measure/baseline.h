@@ -7,7 +7,8 @@
 #include "host/measure/calibration.h"
 #include "host/measure/comparison.h"
 
-enum { BENCH_SCHEMA = 6 }; // the version of the reports' schema
+// The version of the reports' schema, and the oldest that can be read.
+enum { BENCH_SCHEMA = 7, BENCH_SCHEMA_OLDEST = 6 };
 
 // The ratio of times up to which rows of two reports count as the same, unless the user chooses another.
 extern const double baseline_tolerance;
