@@ -71,8 +71,10 @@ class Diff(TestCase):
     def test_refused(self):
         npy("t.npy", (1, 2, 4))
         npy("ids.npy", (1, 2, 4), "<u4")
+        npy("light.npy", [0.5] * 96, "<f4", (4, 8, 3))
         for command, pattern in (
             ("plain.ppm turned.ppm", "8x4 with 3 .* 4x8 with 3"),
+            ("plain.ppm light.npy", "the first image holds display values, the second linear light"),
             ("plain.ppm missing.png", "missing.png"),
             ("plain.ppm", "two"),
             (f"plain.ppm {ROOT}/scenes/demo.yaml", "demo.yaml"),

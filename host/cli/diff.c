@@ -74,7 +74,7 @@ static const char *options_check(void *diff_options)
 static const CommandLine command_line = {
     .command = "diff",
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
-             "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
+             "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and type. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
     .groups = {OPTIONS(command_options), OPTIONS(max_pixels_option), REPORT_OPTIONS},
     OPERANDS(ANY, DiffOptions, images),
@@ -158,11 +158,6 @@ static void limits_print(const DiffOptions *options, const ComparedImages *compa
                unmatched == 1 ? "value is" : "values are");
 }
 
-static const char *kind_word(const Image *image)
-{
-    return image->data ? "data" : image->display ? "display" : "linear";
-}
-
 // Adds the values of the worst pixel.
 static void worst_json(Json *json, const char *key, const ComparedImages *comparison, const Image *image)
 {
@@ -177,10 +172,11 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
     const ImageMetrics *metrics = &comparison->metrics;
     const ErrorSummary *linear = &metrics->linear;
     const Image *reference = &comparison->reference;
+    static const char *const contents[IMAGE_CONTENT_COUNT] = {"linear", "display", "data"};
     Json *json = report_json_open(2, NULL);
     json_addf(json, "reference %s image %s size [%u %u] channels %u kind %s equal %d differing_values %zu",
               options->reference_path, options->test_path, reference->width, reference->height,
-              reference->channels, kind_word(reference), metrics->differing_count == 0,
+              reference->channels, contents[image_content(reference)], metrics->differing_count == 0,
               metrics->differing_count);
     json_addf(json, "nonfinite_pixels {reference %zu image %zu} unmatched_values %zu",
               metrics->nonfinite_reference, metrics->nonfinite_test, metrics->unmatched_count);
@@ -246,7 +242,7 @@ static void text_print(const DiffOptions *options, const ComparedImages *compari
     size_t value_count = (size_t)reference->width * reference->height * reference->channels;
     printf("%s, %s: %ux%u, %u channel%s of %s\n", options->reference_path, options->test_path,
            reference->width, reference->height, reference->channels, text_plural(reference->channels),
-           image_kind(reference));
+           image_content_names[image_content(reference)]);
     if (metrics->differing_count == 0)
         printf("  equal, bit for bit\n");
     else

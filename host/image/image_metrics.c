@@ -53,9 +53,11 @@ ErrorSummary error_summarize(const double *reference, const double *test, size_t
     return summary;
 }
 
-const char *image_kind(const Image *image)
+const char *const image_content_names[IMAGE_CONTENT_COUNT] = {"linear light", "display values", "data"};
+
+ImageContent image_content(const Image *image)
 {
-    return image->data ? "data" : image->display ? "display values" : "linear light";
+    return image->data ? IMAGE_DATA : image->display ? IMAGE_DISPLAY : IMAGE_LINEAR;
 }
 
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages)
@@ -66,9 +68,10 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
                              "the images differ in size: %ux%u with %u channel%s, and %ux%u with %u",
                              reference->width, reference->height, reference->channels,
                              text_plural(reference->channels), test->width, test->height, test->channels);
-    if (strcmp(image_kind(reference), image_kind(test)) != 0)
-        return message_error(messages, "the images differ in kind: the first holds %s, the second %s",
-                             image_kind(reference), image_kind(test));
+    const ImageContent first = image_content(reference), second = image_content(test);
+    if (first != second)
+        return message_error(messages, "the first image holds %s, the second %s", image_content_names[first],
+                             image_content_names[second]);
     return true;
 }
 

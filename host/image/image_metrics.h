@@ -40,9 +40,12 @@ typedef struct {
 // one is, and otherwise at most DBL_MAX.
 double ulp_distance(double expected, double found, bool is_double);
 
-// Returns the kind of an image's values: "display values", "linear light" or "data".
-const char *image_kind(const Image *image);
-// Returns false with an error message if the two images differ in size or kind and so cannot be compared.
+typedef enum { IMAGE_LINEAR, IMAGE_DISPLAY, IMAGE_DATA, IMAGE_CONTENT_COUNT } ImageContent;
+
+// What images contain: "linear light", "display values" or "data".
+extern const char *const image_content_names[IMAGE_CONTENT_COUNT];
+ImageContent image_content(const Image *image);
+// Returns false with an error message if the two images differ in size or content and so cannot be compared.
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages);
 
 // Returns the metrics of comparable images. Display values are compared as light, with the sRGB curve undone
