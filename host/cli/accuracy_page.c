@@ -1,12 +1,14 @@
 #include "host/cli/accuracy_page.h"
 
+#include "host/base/array.h"
 #include "host/base/base64.h"
+#include "host/base/fault.h"
 #include "host/base/memory.h"
-#include "host/cli/png_bytes.h"
 #include "host/cli/report_json.h"
 #include "host/image/heatmap.h"
 #include "host/image/transfer.h"
 #include <math.h>
+#include <png.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,15 +38,34 @@ static void step_colors(Rgb8 colors[STEP_COUNT])
     memcpy(colors[STEP_NOT_FINITE], (Rgb8){255, 0, 0}, sizeof(Rgb8));
 }
 
+// Appends the image as PNG. `pixels` has 3 sRGB values or a palette index per pixel, with rows from the top.
+static void png_bytes_append(Text *png, const uint8_t *pixels, uint32_t width, uint32_t height,
+                             const uint8_t (*palette)[3], uint32_t palette_count)
+{
+    png_image image = {
+        .version = PNG_IMAGE_VERSION,
+        .width = width,
+        .height = height,
+        .format = palette ? PNG_FORMAT_RGB_COLORMAP : PNG_FORMAT_RGB,
+        .colormap_entries = palette_count,
+    };
+    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+    array_reserve(*png, size + 1);
+    if (!png_image_write_to_memory(&image, png->items + png->count, &size, 0, pixels, 0, palette))
+        fault("libpng cannot write: %s", image.message);
+    png->count += size;
+    png->items[png->count] = '\0';
+}
+
 static void png_json(Json *json, const char *key, const AccuracyScene *scene, const uint8_t *pixels,
                      const Rgb8 *palette)
 {
-    Text png = {0}, uri = {0};
+    OwnedText png = {0};
+    Text uri = {0};
     png_bytes_append(&png, pixels, scene->width, scene->height, palette, palette ? STEP_COUNT : 0);
     text_appendf(&uri, "data:image/png;base64,");
     base64_append(&uri, (const uint8_t *)png.items, png.count);
     text_json(json, key, uri);
-    text_free(&png);
 }
 
 static bool same_image(const AccuracyScene *scene, const float *a, const float *b)
@@ -59,16 +80,14 @@ static void difference_json(Json *json, const AccuracyScene *scene, float *value
         .width = scene->width, .height = scene->height, .channels = 3, .values = scene->reference.image};
     Image image = reference;
     image.values = values;
-    float *differences = memory_allocate(pixels, sizeof *differences);
+    OWNED float *differences = memory_allocate(pixels, sizeof *differences);
     image_errors(&reference, &image, differences);
-    uint8_t *steps = memory_allocate(pixels, 1);
+    OWNED uint8_t *steps = memory_allocate(pixels, 1);
     for (size_t i = 0; i < pixels; i++)
         steps[i] = difference_step(differences[i]);
     Rgb8 colors[STEP_COUNT];
     step_colors(colors);
     png_json(json, "difference", scene, steps, (const Rgb8 *)colors);
-    free(steps);
-    free(differences);
 }
 
 static void image_json(Json *json, const AccuracyScene *scene, float *values)
@@ -79,10 +98,9 @@ static void image_json(Json *json, const AccuracyScene *scene, float *values)
     for (size_t i = 0; i < scene->variant_count; i++)
         if (same_image(scene, scene->variants[i].image, values)) json_count(json, NULL, i);
     json_end(json);
-    uint8_t *colors = memory_allocate(count, 1);
+    OWNED uint8_t *colors = memory_allocate(count, 1);
     transfer_quantize(colors, values, count, scene->display_values ? TRANSFER_NONE : TRANSFER_SRGB, 8);
     png_json(json, "image", scene, colors, NULL);
-    free(colors);
     if (values != scene->reference.image) difference_json(json, scene, values);
     json_end(json);
 }
