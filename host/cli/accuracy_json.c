@@ -31,9 +31,8 @@ static const char is_reference[] = "it is the reference that the others are comp
 Text accuracy_saved_prefix(const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
 {
     Text text = {0};
-    char *stem = file_stem(report->scenes[scene].path);
+    OWNED char *stem = file_stem(report->scenes[scene].path);
     text_appendf(&text, "%s/%zu-%s", report->folder, scene, stem);
-    free(stem);
     if (variant)
         text_appendf(&text, "-%s-%u-%s-%u", variant->row->key.precision, variant->row->key.lanes,
                      variant->row->key.bvh, variant->samples);

@@ -48,7 +48,7 @@ double accuracy_frame_ms(const AccuracyVariant *variant)
 // next one takes.
 static void pick_certainty(Text *text, const AccuracyScene *scene, const AccuracyRecommendation *picked)
 {
-    Text ties = {0}, unknown = {0};
+    OwnedText ties = {0}, unknown = {0};
     size_t next = SIZE_MAX;
     for (size_t i = 0; i < scene->variant_count; i++) {
         const Comparison *time = &picked->times[i];
@@ -69,8 +69,6 @@ static void pick_certainty(Text *text, const AccuracyScene *scene, const Accurac
         text_appendf(text, " takes %.3g to %.3g times as long", picked->times[next].low,
                      picked->times[next].high);
     }
-    text_free(&ties);
-    text_free(&unknown);
 }
 
 // Appends the picked variant, its time and its error.
@@ -142,9 +140,8 @@ static void scene_append(Text *notes, const AccuracyScene *scene)
     text_appendf(notes, "fastest rows, with intervals of %g%% confidence for all together:\n",
                  100 * comparison_confidence);
     for (size_t i = 0; i < scene->recommendation_count; i++) {
-        Text sentence = accuracy_pick_sentence(scene, i);
+        OwnedText sentence = accuracy_pick_sentence(scene, i);
         text_appendf(notes, "  %s\n", text_c(&sentence));
-        text_free(&sentence);
     }
 }
 

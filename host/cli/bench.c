@@ -79,14 +79,13 @@ static bool variant_read(BenchOptions *options, size_t index)
     *variant = options->variants;
     variant->name = text;
     options->variant_words[index] = memory_copy_text(text);
-    char **words = memory_allocate_zeroed(strlen(text) / 2 + 3, sizeof *words);
+    OWNED char **words = memory_allocate_zeroed(strlen(text) / 2 + 3, sizeof *words);
     words[0] = name;
     int count = 1;
     const bool is_split = words_split(options->variant_words[index], words, &count);
     if (!is_split) stderr_print("--variant: a quote is not closed");
     const bool is_valid = is_split && words_read(variant, words, count);
     if (!is_valid) stderr_print("the error is in --variant \"%s\"", text);
-    free(words);
     return is_valid;
 }
 
@@ -207,7 +206,7 @@ static int bench_report(const Bench *bench, const Baseline *baseline)
 {
     const BenchOptions *options = &bench->options;
     const VariantSet *set = &bench->set;
-    RowComparison *comparisons = baseline ? rows_compare(bench, baseline) : NULL;
+    OWNED RowComparison *comparisons = baseline ? rows_compare(bench, baseline) : NULL;
     const Device *device = bench->open.compute.device;
     BenchReport report = {
         .device = device,
@@ -216,16 +215,14 @@ static int bench_report(const Bench *bench, const Baseline *baseline)
         .comparisons = comparisons,
     };
     const ReportOptions *format = &options->variants.common.report;
-    int status = bench_print(&report, format) ? EXIT_DONE : EXIT_USER;
+    const int status = bench_print(&report, format) ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         stderr_print("no row could be measured");
-        status = EXIT_USER;
-    } else if (baseline) {
-        baseline_warn(baseline, device);
-        status = comparisons_status(comparisons, set->count, options->baseline);
+        return EXIT_USER;
     }
-    free(comparisons);
-    return status;
+    if (!baseline) return status;
+    baseline_warn(baseline, device);
+    return comparisons_status(comparisons, set->count, options->baseline);
 }
 
 static int bench_run(Bench *bench, const Baseline *baseline)

@@ -89,9 +89,10 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
                          const int *from)
 {
     // --worker comes first, since an argument "--" ends the options
-    char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
+    OWNED char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
     char bench[] = "bench", work[] = "--worker";
-    arguments[0] = memory_copy_text(worker->name);
+    OWNED char *name = memory_copy_text(worker->name);
+    arguments[0] = name;
     arguments[1] = bench;
     arguments[2] = work;
     for (int i = 1; i < options->argument_count; i++)
@@ -105,8 +106,6 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
         error = posix_spawnp(&worker->process, worker->path, &actions, NULL, arguments, environ);
         posix_spawn_file_actions_destroy(&actions);
     }
-    free(arguments[0]);
-    free(arguments);
     if (error) {
         worker->process = 0;
         stderr_print("cannot run '%s': %s", worker->name, strerror(error));
@@ -155,7 +154,7 @@ static bool worker_open(MeasuredProgram *worker, const Against *against)
 // Reads one line of times.
 static bool reply_read(FILE *replies, double *seconds, size_t row_count)
 {
-    char *line = NULL;
+    OWNED char *line = NULL;
     size_t capacity = 0;
     bool whole = getline(&line, &capacity, replies) > 0;
     char *at = line;
@@ -165,7 +164,6 @@ static bool reply_read(FILE *replies, double *seconds, size_t row_count)
         whole = end != at && seconds[i] >= 0 && isfinite(seconds[i]);
         at = end;
     }
-    free(line);
     return whole;
 }
 
@@ -193,8 +191,8 @@ static const double pair_seconds = 0.25; // the time per row
 static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair)
 {
     const size_t row_count = against->set->count;
-    double *seconds = memory_allocate(row_count, sizeof *seconds);
-    Series *times = memory_allocate_zeroed(2 * row_count, sizeof *times);
+    OWNED double *seconds = memory_allocate(row_count, sizeof *seconds);
+    OWNED Series *times = memory_allocate_zeroed(2 * row_count, sizeof *times);
     bool whole = true;
     double start = clock_seconds();
     for (size_t round = 0;
@@ -215,8 +213,6 @@ static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair
             series_add(&against->rows[i].ratios, comparison_log_ratio(&times[2 * i], &times[2 * i + 1]));
     for (size_t i = 0; i < 2 * row_count; i++)
         series_free(&times[i]);
-    free(times);
-    free(seconds);
     return whole;
 }
 

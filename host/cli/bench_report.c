@@ -118,14 +118,13 @@ static void bench_notes(const void *context, size_t i, Text *notes)
     if (has_first(report, i) && report->set->rows[variant_set_first(report->set, i)].failure)
         text_appendf(notes, "    not compared, because %s\n", first_unavailable);
     const RenderReport *last = run_report(report, i);
-    Text abnormal = {0};
+    OwnedText abnormal = {0};
     if (last->device->passports != report->device->passports) passports_abnormal(last->device, &abnormal);
     for (const char *line = text_c(&abnormal); *line; line += strspn(line, "\n")) {
         const int length = (int)strcspn(line, "\n");
         text_appendf(notes, "    %.*s\n", length, line);
         line += length;
     }
-    text_free(&abnormal);
     if (report->lists_launches) launches_append(notes, last);
 }
 

@@ -110,7 +110,7 @@ static void variant_copy_failure(Variant *variant)
 void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds)
 {
     Compute *compute = variant_compute(shared, variant);
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
     if (!timing_builds) row->build_cold.why_not = row->build_cached.why_not = "builds were not timed";
     if ((!timing_builds || builds_measure(compute, variant, row, &messages)) &&
@@ -123,7 +123,6 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
         row->failure =
             memory_copy_text(messages.count > 0 ? messages.items[messages.count - 1].text : "unknown");
     }
-    message_list_free(&messages);
     variant_copy_failure(variant);
 }
 

@@ -257,12 +257,10 @@ static void text_print(const DiffOptions *options, const ComparedImages *compari
 static bool heatmap_make(const DiffOptions *options, const ComparedImages *comparison, MessageList *messages)
 {
     const Image *reference = &comparison->reference;
-    float *errors = memory_allocate((size_t)reference->width * reference->height, sizeof *errors);
+    OWNED float *errors = memory_allocate((size_t)reference->width * reference->height, sizeof *errors);
     image_errors(reference, &comparison->test, errors);
-    bool written = heatmap_write(options->heatmap_path, errors, reference->width, reference->height,
-                                 comparison->metrics.linear.largest, messages);
-    free(errors);
-    return written;
+    return heatmap_write(options->heatmap_path, errors, reference->width, reference->height,
+                         comparison->metrics.linear.largest, messages);
 }
 
 // Reads an image. --layer applies to EXR files; the other file may be an NPY.

@@ -96,10 +96,9 @@ static void device_print(const RenderReport *report)
 
 static void pilot_print(const Pilot *pilot)
 {
-    Text line = {0};
+    OwnedText line = {0};
     pilot_describe(&line, pilot);
     line_print("pilot", pilot->seconds, text_c(&line));
-    text_free(&line);
     line_print("  builds", pilot->build_seconds, "");
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         const PilotCandidate *candidate = &pilot->candidates[i];
@@ -117,9 +116,8 @@ static void pilot_print(const Pilot *pilot)
 static void rerenders_print(RerenderCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    char *text = counts_describe(&counts);
+    OWNED char *text = counts_describe(&counts);
     fprintf(stderr, "certified: %s\n", text);
-    free(text);
 }
 
 static void text_print(const ImageOrigin *origin, const HostTimes *host)

@@ -84,20 +84,18 @@ static void spans_add(Json *json, const char *verb, const HostSpan *spans, size_
                       double origin)
 {
     for (size_t i = 0; i < count; i++) {
-        char *name = text_format("%s%s", verb, spans[i].name);
+        OWNED char *name = text_format("%s%s", verb, spans[i].name);
         span_begin(json, name, thread, spans[i].start_seconds - origin,
                    spans[i].end_seconds - spans[i].start_seconds);
         json_end(json);
-        free(name);
     }
 }
 
 static void device_add(Json *json, const RenderReport *report, size_t thread, double origin)
 {
     const Device *devices[] = {report->device, report->reference_device};
-    char *name = text_format("bands of %s", report->device->name);
+    OWNED char *name = text_format("bands of %s", report->device->name);
     thread_name(json, thread, name);
-    free(name);
     spans_add(json, "", report->bands.items, report->bands.count, thread, origin);
     thread_name(json, thread + 1, "builds");
     spans_add(json, "building ", report->builds.items, report->builds.count, thread + 1, origin);
