@@ -58,6 +58,9 @@ class Failures(TestCase):
         # the report is longer than a buffer
         errors = self.glint("devices --probe --format json --output /dev/full", status=1).stderr
         self.assertEqual(errors, "glint: error: cannot write '/dev/full': No space left on device\n")
+        bench = "bench sphere.yaml --size 8x6 --seconds 0.05 --no-build-times --format json --output"
+        self.glint(f"{bench} old.json")
+        self.glint(f"{bench} /dev/full --compare old.json", status=1)
 
     def test_limit_on_the_size_of_files(self):
         self.glint("render sphere.yaml --size 1000x1000 --quiet -o warm.png")  # the kernel is in the cache then

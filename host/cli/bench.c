@@ -215,12 +215,13 @@ static int bench_report(const Bench *bench, const Baseline *baseline)
         .comparisons = comparisons,
     };
     const ReportOptions *format = &options->variants.common.report;
-    const int status = bench_print(&report, format) ? EXIT_DONE : EXIT_USER;
+    const bool is_written = bench_print(&report, format);
     if (!variant_set_any_measured(set)) {
         stderr_print("no row could be measured");
         return EXIT_USER;
     }
-    if (!baseline) return status;
+    if (!is_written) return EXIT_USER;
+    if (!baseline) return EXIT_DONE;
     baseline_warn(baseline, device);
     return comparisons_status(comparisons, set->count, options->baseline);
 }
