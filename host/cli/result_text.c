@@ -1,6 +1,5 @@
 #include "host/cli/result_text.h"
 
-#include "host/cli/table.h"
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,11 +7,9 @@
 enum {
     GROUP_NAMES = 2,   // how many names have no heading
     HEADING_WIDTH = 9, // up to which words of a heading share a line; most figures are as wide
-    HEADING_LINES_MAX = 4
+    HEADING_LINES_MAX = 4,
+    COLUMNS_MAX = RESULT_NAMES_MAX + RESULT_VALUES_MAX
 };
-
-_Static_assert(RESULT_NAMES_MAX + RESULT_VALUES_MAX <= TABLE_COLUMNS_MAX,
-               "a table of text has as many columns");
 
 // The rows of one table.
 typedef struct {
@@ -20,7 +17,7 @@ typedef struct {
     const ResultRow *rows;
     size_t count, name_count;
     Text lines, alignment;
-    bool is_shown[RESULT_NAMES_MAX + RESULT_VALUES_MAX];
+    bool is_shown[COLUMNS_MAX];
 } RowGroup;
 
 // Returns a name or a value, or NULL past the last value.
@@ -184,6 +181,34 @@ static void row_append(RowGroup *group, const ResultRow *row)
         plain_append(&group->lines, reason);
     }
     text_append(&group->lines, "\n", 1);
+}
+
+// Prints lines of cells, each of which ends with a tab, with every column as wide as its longest cell.
+// `alignment` has an 'l' or 'r' for each column. Text after the last tab of a line, or after its last column,
+// does not belong to a column.
+static void table_print(const char *lines, const char *alignment, FILE *stream)
+{
+    int widths[COLUMNS_MAX] = {0};
+    for (int is_measured = 0; is_measured <= 1; is_measured++) {
+        size_t column = 0;
+        for (const char *cell = lines; *cell != '\0';) {
+            if (cell[strspn(cell, "\t")] == '\n') cell += strspn(cell, "\t"); // no blanks at the end
+            const int length = (int)strcspn(cell, alignment[column] != '\0' ? "\t\n" : "\n");
+            const bool ends_line = cell[length] != '\t';
+            if (is_measured) {
+                const char *gap = column > 0 && !(ends_line && length == 0) ? "  " : "";
+                const char *rest = cell + length;
+                const bool is_last = rest[strspn(rest, "\t")] == '\n';
+                const int padded = alignment[column] == 'r' ? widths[column] : -widths[column];
+                const int width = ends_line || (is_last && padded < 0) ? 0 : padded;
+                fprintf(stream, "%s%*.*s%s", gap, width, length, cell, ends_line ? "\n" : "");
+            } else if (!ends_line && length > widths[column]) {
+                widths[column] = length;
+            }
+            column = ends_line ? 0 : column + 1;
+            cell += cell[length] == '\0' ? length : length + 1;
+        }
+    }
 }
 
 // Prints the reasons for missing values of each column.
