@@ -262,6 +262,13 @@ class Reports(TestCase):
         self.assertEqual(report["schema"], 1)
         self.assertGreaterEqual(len(report["features"]), 14)
 
+    def test_check_of_large_images(self):
+        """Like the other commands that read scenes, check refuses images with more than --max-pixels, and accepts those with fewer."""
+        write("large.ppm", "P3 3 2 255 " + 18 * "0 ")
+        write("image.yaml", SPHERE + "  - sphere: {center: [2, 0, 0], radius: 1, material: {image: large.ppm}}\n")
+        self.glint("check image.yaml --max-pixels 6")
+        self.refuses("check image.yaml --max-pixels 5", "the image has 3 x 2 pixels")
+
     def test_sizes_that_float_cannot_hold(self):
         """A width below a trillionth of an object's distance causes a warning with the object's line, except at double."""
         write("long.yaml", SPHERE + "  - cylinder: {from: [50, 0, -1e17], to: [50, 0, 1e17], radius: 7}\n")

@@ -47,7 +47,7 @@ static const CommandLine command_line = {
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. For several scenes it prints one line each.\n",
     .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(set_options),
-               OPTION(common_options[COMMON_LENIENT])},
+               OPTION(common_options[COMMON_LENIENT]), OPTIONS(max_pixels_option)},
     OPERANDS(SCENES, CheckOptions, scenes),
     .check = options_check};
 
