@@ -127,7 +127,7 @@ MEANINGS = {
     "reference_uncertain": "count; of these, within 2^-80 of the distance of another answer: not counted as right or wrong",
     "reference_ms": "number; computing it",
     "scenes[].same": "boolean; all hashes are those of the line",
-    "scenes[].verdict": "text; `same`, `different`, `another scene` (with another hash) or `no line`",
+    "scenes[].verdict": "text; `same`, `different`, `another scene` (with another hash), `no line` or `not rendered`",
     "scenes[].first": "text or null; the layer that differs first",
     "scenes[].tiles": "count; of 96, whose color differs",
     "scenes[].{left,top,right,bottom}": "count; pixels of the rectangle that has these tiles; `right` and `bottom` are beyond it",

@@ -130,6 +130,17 @@ class Golden(TestCase):
         out = self.glint("golden check --format csv", status=3).stdout.splitlines()
         self.assertRegex(out[1], r"^s\.yaml,another scene,object,\d+,\d+,\d+,\d+,\d+,s\.yaml-golden\.png$")
 
+    def test_a_scene_that_cannot_be_read(self):
+        """The other scenes are checked, and reported together with it."""
+        self.written()
+        write("golden.txt", read("golden.txt") + read("golden.txt").splitlines()[-1].replace("s.yaml", "missing.yaml") + "\n")
+        process = self.glint("golden check missing.yaml s.yaml", status=1)
+        self.assertEqual(process.stdout, "s.yaml: same\n")
+        self.assertIn("missing.yaml", process.stderr)
+        report = self.json("golden check missing.yaml s.yaml --json", status=1)
+        self.assertEqual([(scene["scene"], scene["verdict"], scene["same"], scene["first"]) for scene in report["scenes"]],
+                         [("missing.yaml", "not rendered", False, None), ("s.yaml", "same", True, None)])
+
     def test_refused(self):
         line = self.written()
         for wrong in "size=0x18" + line.split("size=24x18")[1], line.replace("tiles=", "tiles=g"), line.replace(" path=", " paths="), "x\n":

@@ -34,11 +34,11 @@ typedef struct {
 // The comparison of a scene with its line.
 typedef struct {
     const char *scene;
-    bool is_new, scene_differs;
-    size_t first;      // the index of the first layer that differs, or HASHED_COUNT
-    size_t tile_count; // tiles that differ
-    PixelBox box;      // contains all tiles that differ
-    char *crop;        // the file that shows the box, or NULL
+    bool has_failed, is_new, scene_differs; // has_failed: it could not be rendered, and only `scene` is set
+    size_t first;                           // the index of the first layer that differs, or HASHED_COUNT
+    size_t tile_count;                      // tiles that differ
+    PixelBox box;                           // contains all tiles that differ
+    char *crop;                             // the file that shows the box, or NULL
 } GoldenCheck;
 
 static const Option command_options[] = {
@@ -209,20 +209,24 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
     return status;
 }
 
+static const char *verdict_of(const GoldenCheck *check)
+{
+    if (check->has_failed) return "not rendered";
+    if (check->is_new) return "no line";
+    if (check->first == HASHED_COUNT) return "same";
+    return check->scene_differs ? "another scene" : "different";
+}
+
 static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t count)
 {
     Json *json = report_json_open(1, device);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < count; i++) {
         const GoldenCheck *check = &checks[i];
-        const bool same = check->first == HASHED_COUNT;
+        const bool same = check->first == HASHED_COUNT, is_compared = !check->has_failed && !check->is_new;
         json_begin_object(json, NULL);
-        json_addf(json, "scene %s same %d verdict %s", check->scene, same,
-                  check->is_new          ? "no line"
-                  : same                 ? "same"
-                  : check->scene_differs ? "another scene"
-                                         : "different");
-        json_text(json, "first", same || check->is_new ? NULL : layer_names[hashed_layers[check->first]]);
+        json_addf(json, "scene %s same %d verdict %s", check->scene, same, verdict_of(check));
+        json_text(json, "first", same || !is_compared ? NULL : layer_names[hashed_layers[check->first]]);
         json_count(json, "tiles", check->tile_count);
         if (check->tile_count > 0)
             json_addf(json, "left %u top %u right %u bottom %u", check->box.left, check->box.top,
@@ -276,18 +280,20 @@ static int scenes_write(GoldenFile *file, const GoldenOptions *options, Compute 
     return is_written ? EXIT_DONE : EXIT_USER;
 }
 
+// Returns EXIT_DONE if the scene is the same as its line, EXIT_CHECK if not, or the status of the failure.
 static int scene_check(GoldenCheck *check, const GoldenFile *file, const GoldenOptions *options,
                        Compute *compute)
 {
     const GoldenLine *golden = golden_file_find(file, check->scene);
     check->is_new = !golden;
-    if (!golden) return EXIT_DONE;
+    if (!golden) return EXIT_CHECK;
     GoldenLine now = *golden;
-    Film film = {0};
+    OwnedFilm film = {0};
     const int status = golden_render(&now, &film, options, compute);
-    if (status == EXIT_DONE) lines_compare(check, golden, &now, &film);
-    film_free(&film);
-    return status;
+    check->has_failed = status != EXIT_DONE;
+    if (check->has_failed) return status;
+    lines_compare(check, golden, &now, &film);
+    return check->first < HASHED_COUNT ? EXIT_CHECK : EXIT_DONE;
 }
 
 static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Compute *compute)
@@ -298,21 +304,24 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         return EXIT_USER;
     }
     GoldenCheck *checks = memory_allocate_zeroed(checked, sizeof *checks);
-    int status = EXIT_DONE, differing = 0;
-    for (size_t i = 0; i < checked && status == EXIT_DONE; i++) {
-        checks[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : file->items[i].scene;
-        status = scene_check(&checks[i], file, options, compute);
-        differing += checks[i].is_new || checks[i].first < HASHED_COUNT;
-        if (status == EXIT_DONE && report_has_text(&options->common.report)) check_print(&checks[i]);
-    }
     const ReportOptions *report = &options->common.report;
-    if (status == EXIT_DONE && report_has_document(report) &&
+    bool continues = true;
+    int status = EXIT_DONE;
+    for (size_t i = 0; i < checked && continues; i++) {
+        GoldenCheck *check = &checks[i];
+        check->scene = options->scenes.count > 0 ? options->scenes.items[i] : file->items[i].scene;
+        const int result = scene_check(check, file, options, compute);
+        continues = result != EXIT_MACHINE && result != EXIT_INTERRUPTED;
+        if (check->has_failed || status == EXIT_DONE) status = result;
+        if (!check->has_failed && report_has_text(report)) check_print(check);
+    }
+    if (continues && report_has_document(report) &&
         !report_write(checks_json(compute->device, checks, checked), report))
         status = EXIT_USER;
     for (size_t i = 0; i < checked; i++)
         free(checks[i].crop);
     free(checks);
-    return status == EXIT_DONE && differing > 0 ? EXIT_CHECK : status;
+    return status;
 }
 
 int command_golden(int argument_count, char **arguments)
