@@ -3,7 +3,9 @@
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/output.h"
+#include "host/cli/command_line.h"
 #include "tests/check.h"
+#include "tests/child.h"
 #include "tests/files.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -278,6 +280,26 @@ TEST(forked_process_keeps_the_temporary)
     unnamed_are_refused = false;
     check_content("new", "new");
     unlink("new");
+}
+
+static void output_lose(void *unused)
+{
+    (void)unused;
+    assert_non_null(freopen("/dev/full", "w", stdout));
+    setvbuf(stdout, NULL, _IONBF, 0);
+    printf("lost");
+    errno = ENOENT; // of a later call
+    exit(command_finish(EXIT_DONE));
+}
+
+// A write that failed earlier, and whose reason is lost, is not reported with that of another call.
+TEST(a_lost_write)
+{
+    if (access("/dev/full", W_OK) != 0) skip();
+    char unused = 0;
+    ChildEnd end = child_run(output_lose, &unused, sizeof unused);
+    assert_string_equal(end.errors, "glint: cannot write to standard output: Input/output error\n");
+    assert_int_equal(end.status, EXIT_MACHINE);
 }
 
 TEST_MAIN(folder_open, folder_close)

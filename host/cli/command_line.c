@@ -32,6 +32,7 @@ int command_finish(int status)
 {
     if (status == EXIT_INTERRUPTED) interrupt_report("");
     // a truncated report must not exit with success
+    errno = EIO; // the error of an earlier write is lost
     if (fflush(stdout) != 0 || ferror(stdout)) {
         stderr_print("cannot write to standard output: %s", strerror(errno));
         return EXIT_MACHINE;
