@@ -103,9 +103,9 @@ class Checkpoints(TestCase):
         for command, reason in ((RENDER.replace("sphere", "other"), "scene"), (f"{RENDER} --set objects[0].sphere.radius=1.01", "scene"),
                                 (RENDER.replace("256", "128"), "size"),
                                 (RENDER.replace("strict", "single"), "precision"), (RENDER.replace("100", "99"), "samples"),
-                                (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"),
-                                (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb"),
-                                (f"{RENDER} --build-options=-DUNUSED", "build options")):
+                                (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"), (f"{RENDER} --min-contribution 0.01", "min-contribution"),
+                                (f"{RENDER} --aov t", "aov"), (f"{RENDER} --perturb 1", "perturb"),
+                                (f"{RENDER} --build-options=-DUNUSED", "build-options")):
             self.refuses(f"{command} -o other.npy --checkpoint saved", rf"'saved' belongs to another image \({reason}: ", env=POCL)
         self.refuses(f"{RENDER} -o other.npy --checkpoint sphere.yaml", "'sphere.yaml' is not a checkpoint", env=POCL)
         self.assertEqual(Path("saved").read_bytes(), saved)

@@ -24,7 +24,8 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# Faults of a rank. Its device has so few bytes of memory, or it is interrupted as it reads a scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
+# Faults of a rank. Its device has so few bytes of memory, its second device has another driver, or it is interrupted as it reads a
+# scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
 # without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
@@ -39,6 +40,10 @@ int clGetDeviceInfo(void *device, unsigned name, size_t size, void *value, size_
 {
     const int status = ((int (*)())dlsym(RTLD_NEXT, "clGetDeviceInfo"))(device, name, size, value, value_size);
     const int is_memory = name == 0x101F || name == 0x1010; // CL_DEVICE_GLOBAL_MEM_SIZE, CL_DEVICE_MAX_MEM_ALLOC_SIZE
+    static void *first;
+    if (!first) first = device;
+    const int is_version = name == 0x102D; // CL_DRIVER_VERSION
+    if (getenv("FAULT_REFERENCE") && value && is_version && device != first) *(char *)value = '?';
     if (getenv("FAULT_MEMORY") && value && is_memory) *(unsigned long long *)value = atoi(getenv("FAULT_MEMORY"));
     return status;
 }
@@ -246,6 +251,16 @@ class Mpi(TestCase):
         """A refused checkpoint ends all ranks."""
         Path("saved").write_text("no checkpoint")
         self.mpirun(f"-n 2 {RANKS} {RENDER} --checkpoint saved", status=1)
+
+    def test_a_checkpoint_of_another_reference_device(self):
+        """It is refused, whichever rank has that device."""
+        self.faults_build()
+        command = f"env POCL_DEVICES='pthread pthread' {RANKS} {RENDER} -o ranks.npy --precision certified --device 0 --reference-device 1 --checkpoint saved"
+        failing, other = (f"env LD_PRELOAD=./faults.so {fault}" for fault in ("", "FAULT_USEC=0 FAULT_REFERENCE=1"))
+        self.mpirun_each(f"{failing} {command}", f"{failing} {command}", status=2)
+        process = self.mpirun_each(command, f"{other} {command}", status=1)
+        self.assertRegex(process.stderr, r"'saved' belongs to another image \(device: ")
+        self.mpirun_each(command, command)
 
     def test_frames_of_failing_devices(self):
         """Other ranks render the frame of a rank whose device fails. If no rank is left, the job exits with status 2."""

@@ -25,11 +25,11 @@ static bool is_of_make(const Rank *rank, const Rank *other)
 static bool is_mixed(const ImageOrigin *origin)
 {
     Rank first = {0};
-    rank_set_device(&first, renderer_report(origin->renderers[0])->device);
+    rank_set_devices(&first, renderer_report(origin->renderers[0])->device, NULL);
     bool differs = false;
     for (size_t i = 1; i < origin->renderer_count; i++) {
         Rank local = {0};
-        rank_set_device(&local, renderer_report(origin->renderers[i])->device);
+        rank_set_devices(&local, renderer_report(origin->renderers[i])->device, NULL);
         differs = differs || !is_of_make(&local, &first);
     }
     for (size_t i = 0; origin->ranks && i < origin->ranks->remote.count; i++)

@@ -72,7 +72,7 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         return;
     }
     worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
-    rank_set_device(self, compute->device);
+    rank_set_devices(self, compute->device, compute->reference ? compute->reference->device : NULL);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
         self->lanes[pass] = renderer_lanes(worker->renderer, pass);
 }
