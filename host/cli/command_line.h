@@ -133,8 +133,8 @@ bool option_fault(const Option *option, const char *value, const char *expected,
     __attribute__((format(printf, 3, 4)));
 
 // Prints that the command was interrupted, unless it has already done so. Flushes standard output. A later
-// fault then causes only a warning. Returns the exit status, which is EXIT_MACHINE with a message if the
-// output could not be written.
+// fault then causes only a warning. Returns the exit status, which is EXIT_MACHINE with a message if standard
+// output failed.
 int command_finish(int status);
 
 // Prints a line to standard error, after "glint: ". Returns false, so that a function can return its error.
