@@ -37,6 +37,14 @@ typedef struct {
     Rank self;
 } RankRenderer;
 
+// Returns the text of the first error, or "" if there is none.
+static const char *first_error(const MessageList *messages)
+{
+    for (size_t i = 0; i < messages->count; i++)
+        if (messages->items[i].severity == MESSAGE_ERROR) return messages->items[i].text;
+    return "";
+}
+
 static void device_close_quietly(RankRenderer *worker)
 {
     renderer_close(worker->renderer);
@@ -59,7 +67,7 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         const Device *device =
             device_choose_numbered(&worker->device.devices, selector, worker->local_rank, &worker->messages);
         if (!device) {
-            snprintf(self->failure, sizeof self->failure, "%s", worker->messages.items[0].text);
+            snprintf(self->failure, sizeof self->failure, "%s", first_error(&worker->messages));
             device_list_close(&worker->device.devices);
             return;
         }
@@ -96,18 +104,16 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
 // TAG_END, which would otherwise end the next job.
 static void worker_render(RankRenderer *worker, unsigned aovs)
 {
-    char failure[sizeof worker->self.failure] = "";
+    char failure[sizeof worker->self.failure];
     bool has_ended = false;
     const BandQueue queue = {
         .acquire = rows_acquire, .deliver = band_send, .has_ended = end_poll, .context = &has_ended};
     const Compute *compute = &worker->device.compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
-    if (worker->messages.count > 0) {
-        snprintf(failure, sizeof failure, "%s", worker->messages.items[0].text);
-    } else if (!compute_ok(compute)) {
-        char *text = compute_failure_text(compute);
+    snprintf(failure, sizeof failure, "%s", first_error(&worker->messages));
+    if (failure[0] == '\0' && !compute_ok(compute)) {
+        OWNED char *text = compute_failure_text(compute);
         snprintf(failure, sizeof failure, "%s", text);
-        free(text);
     }
     send_bytes(failure, sizeof failure, 0, TAG_DONE);
     end_await(&has_ended);
@@ -124,11 +130,9 @@ static char *selector_receive(size_t size)
 static void job_run(RankRenderer *worker, const Job *job)
 {
     Order order;
-    char *selector = selector_receive(job->device_selector_size);
-    char *reference_selector = selector_receive(job->reference_selector_size);
+    OWNED char *selector = selector_receive(job->device_selector_size);
+    OWNED char *reference_selector = selector_receive(job->reference_selector_size);
     worker_begin(worker, job, selector, reference_selector);
-    free(reference_selector);
-    free(selector);
     MPI_Gather(&worker->self, sizeof worker->self, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
     while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.type == ORDER_SCENE)
         scene_receive(worker, order.variant);
