@@ -1,13 +1,10 @@
-#include "host/mpi/first_rank.h"
+#include "host/mpi/messages.h"
 
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/render.h"
-#include "host/mpi/frames.h"
-#include "host/mpi/messages.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "host/mpi/frames.h"
+#include "host/mpi/messages.h"
 
 #include "host/base/array.h"
 #include "host/base/exit_status.h"
@@ -6,7 +6,6 @@
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/mpi/messages.h"
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -112,7 +111,7 @@ typedef struct {
     pthread_mutex_t mutex;
     RenderCommand *command;
     size_t next, end;       // frames that were not dealt yet
-    ARRAY_OF(size_t) again; // of ranks whose devices failed
+    ARRAY_OF(size_t) retries; // frames of ranks whose devices failed
     size_t workers, dealt;  // workers whose devices work, frames that are being rendered
     atomic_bool has_ended;
 } Deal;
@@ -122,8 +121,8 @@ static size_t frame_acquire(Deal *deal)
 {
     size_t frame = NO_FRAME;
     pthread_mutex_lock(&deal->mutex);
-    if (!deal->has_ended && deal->again.count > 0)
-        frame = deal->again.items[--deal->again.count];
+    if (!deal->has_ended && deal->retries.count > 0)
+        frame = deal->retries.items[--deal->retries.count];
     else if (!deal->has_ended && deal->next < deal->end)
         frame = deal->next++;
     deal->dealt += frame != NO_FRAME;
@@ -143,7 +142,7 @@ static bool frame_record(Deal *deal, size_t frame, int status)
     if (works) {
         render_command_record(deal->command, status);
     } else {
-        array_push(deal->again, frame);
+        array_push(deal->retries, frame);
         deal->end = deal->command->count;
         deal->workers--;
     }
@@ -157,7 +156,7 @@ static bool deal_is_over(Deal *deal)
 {
     pthread_mutex_lock(&deal->mutex);
     const bool is_over =
-        deal->has_ended || (deal->dealt == 0 && deal->again.count == 0 && deal->next == deal->end);
+        deal->has_ended || (deal->dealt == 0 && deal->retries.count == 0 && deal->next == deal->end);
     pthread_mutex_unlock(&deal->mutex);
     return is_over;
 }
@@ -249,11 +248,11 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     frames_serve(&deal, other_count);
     if (has_thread) pthread_join(thread, NULL);
     interrupts_release();
-    free(deal.again.items);
+    free(deal.retries.items);
     if (deal.workers == 0) {
         stderr_print("no rank is left that can render");
         render_command_record(command, EXIT_MACHINE);
-    } else if (is_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
+    } else if (is_interrupted() && (deal.next < deal.end || deal.retries.count > 0)) {
         render_command_record(command, EXIT_INTERRUPTED);
     }
     return deal.end;

@@ -8,9 +8,7 @@
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/import/mesh/assimp_process.h"
-#include "host/mpi/first_rank.h"
-#include "host/mpi/other_rank.h"
-#include <mpi.h>
+#include "host/mpi/messages.h"
 
 int main(int argument_count, char **arguments)
 {

@@ -66,12 +66,12 @@ void end_await(bool *has_ended)
     *has_ended = true;
 }
 
-void scene_broadcast(CompiledScene *compiled, bool takes)
+void scene_broadcast(CompiledScene *compiled, bool needs_scene)
 {
     int rank;
     MPI_Comm ranks;
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-    MPI_Comm_split(MPI_COMM_WORLD, takes ? 0 : MPI_UNDEFINED, rank, &ranks);
+    MPI_Comm_split(MPI_COMM_WORLD, needs_scene ? 0 : MPI_UNDEFINED, rank, &ranks);
     if (ranks == MPI_COMM_NULL) return;
     broadcast(compiled, sizeof *compiled, ranks);
     if (rank != 0) {

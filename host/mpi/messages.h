@@ -6,7 +6,7 @@
 //
 // JOB_IMAGE: all ranks render bands of one image.
 // 1. The first rank broadcasts the selectors of the device and of the reference device. Each other rank opens
-// a device and answers with its Rank.
+//    a device and answers with its Rank.
 // 2. The first rank broadcasts Orders: ORDER_SCENE with each variant of the scene that a rank needs, followed
 //    by the compiled scene for the ranks that need it, and then ORDER_START. ORDER_CANCEL ends the job
 //    instead if a rank has no device or the image cannot be rendered.
@@ -26,7 +26,7 @@
 //    failed. Other ranks then render its frame.
 #pragma once
 
-#include "host/cli/ranks.h"
+#include "host/cli/render.h"
 #include <mpi.h>
 
 enum {
@@ -76,7 +76,22 @@ bool end_poll(void *has_ended);
 // Waits for TAG_END unless it was received.
 void end_await(bool *has_ended);
 
-// Sends a compiled scene from the first rank to the others that call with `takes`, which allocate its arrays.
-// All ranks call it, the first one with `takes`. A rank that does not take the scene leaves `compiled`
-// unchanged. Arrays that only a move of the scene reads are not sent.
-void scene_broadcast(CompiledScene *compiled, bool takes);
+// Sends a compiled scene from the first rank to the others that call with `needs_scene`, which allocate its
+// arrays. All ranks call it, the first one with `needs_scene`. The others leave `compiled` unchanged. Arrays
+// that only a move of the scene reads are not sent.
+void scene_broadcast(CompiledScene *compiled, bool needs_scene);
+
+// The processes. Each is called with the arguments of glint-mpi.
+
+// Runs glint render on the first rank, with the other ranks' devices added. Returns the exit status.
+int first_rank_run(size_t other_count, int argument_count, char **arguments);
+// Renders rows of the first rank's images on another rank's device, until there are no more images.
+// `local_rank` is the rank's number on its machine, by which ranks share the devices.
+void other_rank_run(size_t local_rank, int argument_count, char **arguments);
+
+// Distribute whole frames. If all ranks see the files, each renders frames alone, the next one as soon as it
+// has finished one. Frames that do not divide evenly are left to all ranks together.
+// frames_deal runs on the first rank with the command of the arguments. Returns the first frame that is left
+// to all ranks. frames_work runs on another rank.
+size_t frames_deal(RenderCommand *command, size_t other_count, int argument_count, char **arguments);
+void frames_work(size_t local_rank, int argument_count, char **arguments);

@@ -1,10 +1,8 @@
-#include "host/mpi/other_rank.h"
+#include "host/mpi/messages.h"
 
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/open_device.h"
-#include "host/mpi/frames.h"
-#include "host/mpi/messages.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -89,9 +87,9 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
 static void scene_receive(RankRenderer *worker, SceneVariant variant)
 {
     CompiledScene compiled;
-    const bool takes = worker->self.lanes[variant.pass] == variant.lanes;
-    scene_broadcast(&compiled, takes);
-    if (!takes) return;
+    const bool needs_scene = worker->self.lanes[variant.pass] == variant.lanes;
+    scene_broadcast(&compiled, needs_scene);
+    if (!needs_scene) return;
     if (!worker->renderer) {
         compiled_scene_free(&compiled);
     } else if (!renderer_receive_scene(worker->renderer, variant.pass, &compiled, &worker->messages)) {
