@@ -24,8 +24,9 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# Faults of a rank. Its device has so few bytes of memory, its second device has another driver, or it is interrupted as it reads a
-# scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
+# Faults of a rank. Its device has so few bytes of memory, its second device has another driver, it is interrupted as it reads a
+# scene, or it is killed as it learns whether all see the files. Or data that it sends with the tag FAULT_TAG has a wrong word, is
+# sent FAULT_TIMES, or is replaced by an end
 # without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
@@ -55,6 +56,11 @@ FILE *fopen(const char *path, const char *mode)
 FILE *fopen64(const char *path, const char *mode) // where a library's flags ask for large files
 {
     return fopen(path, mode);
+}
+int MPI_Allreduce(const void *bytes, void *result, int count, MPI_Datatype type, MPI_Op operation, MPI_Comm ranks)
+{
+    if (getenv("FAULT_KILLED")) raise(SIGKILL);
+    return PMPI_Allreduce(bytes, result, count, type, operation, ranks);
 }
 int MPI_Send(const void *bytes, int size, MPI_Datatype type, int rank, int tag, MPI_Comm ranks)
 {
@@ -255,10 +261,11 @@ class Mpi(TestCase):
     def test_a_checkpoint_of_another_reference_device(self):
         """It is refused, whichever rank has that device."""
         self.faults_build()
-        command = f"env POCL_DEVICES='pthread pthread' {RANKS} {RENDER} -o ranks.npy --precision certified --device 0 --reference-device 1 --checkpoint saved"
-        failing, other = (f"env LD_PRELOAD=./faults.so {fault}" for fault in ("", "FAULT_USEC=0 FAULT_REFERENCE=1"))
-        self.mpirun_each(f"{failing} {command}", f"{failing} {command}", status=2)
-        process = self.mpirun_each(command, f"{other} {command}", status=1)
+        options = f"{RENDER} -o ranks.npy --precision certified --device 0 --reference-device 1 --checkpoint saved"
+        two = {"POCL_DEVICES": "'pthread pthread'"}
+        command, failing, other = (f"{faulty(two | faults)} {options}" for faults in ({}, FAILING, {"FAULT_REFERENCE": 1}))
+        self.mpirun_each(failing, failing, status=2)
+        process = self.mpirun_each(command, other, status=1)
         self.assertRegex(process.stderr, r"'saved' belongs to another image \(device: ")
         self.mpirun_each(command, command)
 
@@ -296,6 +303,19 @@ class Mpi(TestCase):
         process = self.mpirun_each(interrupted, f"{RANKS} {command} -o frames", status=130)
         self.assertRegex(process.stderr, "glint: interrupted: no image was written; an earlier frames/")
         self.assertEqual([name for name in os.listdir("frames") if not name.endswith(".png")], [])
+
+    def test_a_kill_while_files_are_compared(self):
+        """The next run removes the file by which the ranks learn whether they share the images' folder."""
+        self.faults_build()
+        command = self.write_frames()
+        shutil.copytree("expected", "frames")
+        ranks = f"{RANKS} {command} -o frames"
+        write("rank.sh", f"test $OMPI_COMM_WORLD_RANK != 0 || exec {faulty({'FAULT_KILLED': 1})} {command} -o frames\nexec {ranks}\n")
+        killed = subprocess.run(["mpirun", "-n", "2", "sh", "rank.sh"], env=environment(), stdin=subprocess.DEVNULL, capture_output=True, timeout=120, check=False)
+        self.assertNotEqual(killed.returncode, 0)
+        self.assertEqual(len(os.listdir("frames")), len(os.listdir("expected")) + 1)
+        self.mpirun(f"-n 2 {ranks}")
+        self.check_frames()
 
     def mpirun_faulty(self, *faults, status=0):
         """Runs a job in which each rank has the faults of its variables."""

@@ -2,10 +2,12 @@
 
 #include "host/base/array.h"
 #include "host/base/exit_status.h"
+#include "host/base/file.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"
+#include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -70,13 +72,15 @@ static bool uses_standard_streams(const RenderCommand *command)
     return false;
 }
 
-// Makes a new file in the images' folder. Its name is empty if that fails.
+// Makes a new file in the images' folder. Its name is empty if that fails. It is that of a temporary of the
+// first image (output.h), so that the next process that replaces the image removes what a killed one left.
 static void marker_make(const RenderCommand *command, char *name)
 {
-    const char *path = command->paths[0], *slash = strrchr(path, '/');
+    const char *path = command->paths[0], *image = file_base_name(path);
     const int length =
-        snprintf(name, MARKER_BYTES, "%.*s.glint-XXXXXX", slash ? (int)(slash + 1 - path) : 0, path);
-    const int descriptor = length < MARKER_BYTES ? mkstemp(name) : -1;
+        snprintf(name, MARKER_BYTES, "%.*s.%.200s.glint-%d", (int)(image - path), path, image, (int)getpid());
+    const int descriptor =
+        length < MARKER_BYTES ? open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600) : -1;
     if (descriptor >= 0)
         close(descriptor);
     else
@@ -110,9 +114,9 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
 typedef struct {
     pthread_mutex_t mutex;
     RenderCommand *command;
-    size_t next, end;       // frames that were not dealt yet
+    size_t next, end;         // frames that were not dealt yet
     ARRAY_OF(size_t) retries; // frames of ranks whose devices failed
-    size_t workers, dealt;  // workers whose devices work, frames that are being rendered
+    size_t workers, dealt;    // workers whose devices work, frames that are being rendered
     atomic_bool has_ended;
 } Deal;
 
