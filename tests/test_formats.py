@@ -168,7 +168,7 @@ class Formats(TestCase):
         self.assertEqual(json.loads(read("report.json"))["schema"], 3)
         self.refuses("verify S1 --output report.txt", "the file's ending gives no format")
         for options in "", "--json", "--format csv":
-            self.refuses(f"verify S1 --output - {options}", "--output takes a file")
+            self.refuses(f"verify S1 --output - {options}", "--output: expected the name of a file")
         for path in "text.json", "text.txt":
             self.refuses(f"verify S1 --format text --output {path}", "--format text cannot be combined with --output")
         self.refuses("verify S1 --format benchmark", "--format: expected text, json, csv, markdown or junit")

@@ -215,7 +215,7 @@ class Html(TestCase):
         self.check_drawn(page, report)
 
     def test_refused_before_measuring(self):
-        self.refuses("accuracy spheres16.yaml --html -", "needs the name of a file")
+        self.refuses("accuracy spheres16.yaml --html -", "--html: expected the name of a file")
         self.refuses("accuracy spheres16.yaml --html nowhere/page.html", "nowhere/page.html")
 
 

@@ -168,7 +168,7 @@ class SideBySide(TestCase):
         for option in "-o r.tar.gz", "--device 0", "--seconds 5":
             self.refuses(f"report {good} {option}", "--html is the only option for reports")
         self.refuses("report S1 --html page.html", "--html needs reports")
-        self.refuses(f"report {good} --html -", "--html needs the name of a file")
+        self.refuses(f"report {good} --html -", "--html: expected the name of a file")
         self.refuses(f"report {good} --html ./good.json", "would overwrite the report 'good.json'")
         self.refuses(f"report {good} --html none/page.html", "none/page.html")
         self.refuses(f"report {' '.join([good] * 27)}", "at most 26")

@@ -39,13 +39,13 @@ static const Option command_options[] = {
      0, NUMBERS_ABOVE(0, INFINITY)},
     {"save", "FOLDER", "write all compared arrays there, as .npy", option_text,
      offsetof(AccuracyOptions, folder), .effect = effect_folder},
-    {"html", "FILE", "write a self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
+    {"html", "FILE", "write a self-contained HTML report", option_named_file,
+     offsetof(AccuracyOptions, page_path)},
     PRECISIONS_OPTION("the first three")};
 
 static const char *options_check(void *accuracy_options)
 {
     const AccuracyOptions *options = accuracy_options;
-    if (options->page_path && strcmp(options->page_path, "-") == 0) return "--html needs the name of a file";
     if (options->reference_path && options->scenes.count > 1)
         return "--reference takes one scene, but several are given";
     return NULL;

@@ -74,6 +74,12 @@ bool option_text(const Option *option, const char *value, void *options)
     return true;
 }
 
+bool option_named_file(const Option *option, const char *value, void *options)
+{
+    if (strcmp(value, "-") == 0) return option_fault(option, value, "the name of a file");
+    return option_text(option, value, options);
+}
+
 bool option_texts(const Option *option, const char *value, void *options)
 {
     OptionTexts *texts = option_field(option, options);

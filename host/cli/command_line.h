@@ -96,6 +96,7 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
 // Readers. The types are those of their fields.
 OptionReader option_flag;       // bool: set
 OptionReader option_text;       // const char *
+OptionReader option_named_file; // const char *: the name of a file, which is not "-"
 OptionReader option_texts;      // OptionTexts: each use of the option adds a text
 OptionReader option_count;      // uint32_t: an integer from `low` to `high`
 OptionReader option_number;     // double, from `low` to `high`

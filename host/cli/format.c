@@ -47,7 +47,7 @@ const Option timed_format_option = {"format",
                                     .given = offsetof(CommonOptions, report.has_format)};
 
 const Option report_options[] = {{"output", "FILE", "write the report to a file and print the text",
-                                  option_text, offsetof(CommonOptions, report.output),
+                                  option_named_file, offsetof(CommonOptions, report.output),
                                   .effect = report_file_open},
                                  {"json", NULL, "print JSON", option_choice,
                                   offsetof(CommonOptions, report.format), .values = json_format}};
@@ -69,8 +69,6 @@ const char *report_options_check(void *common)
 {
     ReportOptions *options = &((CommonOptions *)common)->report;
     const bool needs_format = options->output && options->format == FORMAT_TEXT;
-    if (options->output && strcmp(options->output, "-") == 0)
-        return "--output takes a file; without it, the report goes to standard output";
     if (needs_format && options->has_format)
         return "--format text cannot be combined with --output, since the text is printed in any case";
     if (needs_format) options->format = format_of_ending(options->output);

@@ -24,12 +24,6 @@ static bool perturb_read(const Option *option, const char *value, void *options)
     return true;
 }
 
-static bool camera_read(const Option *option, const char *value, void *options)
-{
-    if (strcmp(value, "-") == 0) return option_fault(option, value, "the name of a file");
-    return option_text(option, value, options);
-}
-
 #define FIELD(member) offsetof(CommonOptions, member)
 
 const Option size_option[] = {{"size", "WxH",
@@ -74,7 +68,7 @@ const Option ray_options[] = {
 const Option set_options[] = {
     {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; may be repeated", option_texts,
      FIELD(overrides)},
-    {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(scene.camera)}};
+    {"camera", "FILE", "use the camera of this scene", option_named_file, FIELD(scene.camera)}};
 const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
                                   "inject the rounding error that OpenCL permits, times SCALE (default: 1)",
                                   perturb_read, 0}};

@@ -52,7 +52,7 @@ static const Option archive_options[] = {{"output", "FILE", "the archive (defaul
 static const Option command_precision[] = {PRECISION_OPTION(
     "single, strict or double (default: all for verify, single for bench)", ARITHMETIC_COUNT)};
 static const Option page_option[] = {{"html", "FILE", "write a self-contained HTML page of this comparison",
-                                      option_text, offsetof(ReportChoice, page)}};
+                                      option_named_file, offsetof(ReportChoice, page)}};
 
 // Lists the options for verify and bench.
 static void passed_list(ReportChoice *choice)
@@ -98,7 +98,6 @@ static const char *options_check(void *report_choice)
     if (choice->output || choice->seconds > 0 || choice->passed_count > 0)
         return "--html is the only option for reports (.json)";
     if (count > SIDE_REPORTS_MAX) return "at most 26 reports can be compared";
-    if (choice->page && strcmp(choice->page, "-") == 0) return "--html needs the name of a file";
     return NULL;
 }
 
