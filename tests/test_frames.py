@@ -162,7 +162,7 @@ class Frames(TestCase):
         self.assertTrue(os.path.exists("image.png"))
         self.refuses("render -", r"-:1:1: error: unknown", input="ball: {}")
         for options, reason in {"-o -": "needs --format", "--format png": "is for --output -", "-o - --format exr": "expected png",
-                                "-o - --format png --aov t": "several files", "-o - --format png --skip-existing": "is for files", "-o - --format png --timing=json": "--output - takes",
+                                "-o - --format png --aov t": "several files", "-o - --format png --skip-existing": "is for files", "-o - --format png --timing=json": "where --output - writes",
                                 "-o - --format npy --dither": "linear values"}.items():
             self.refuses(f"render moving.yaml {options}", reason)
         for size in "8x8", "512x512":  # one whose bytes wait in a buffer, and one that fails while it is rendered

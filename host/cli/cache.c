@@ -16,9 +16,11 @@ static const Option command_options[] = {
 
 static const CommandLine command_line = {
     .command = "cache",
-    .usage = "usage: glint cache [OPTIONS]\n\n"
-             "Lists and checks the programs of the kernel cache, the least recently used first.\nExit status "
-             "3: one is damaged or not private.\n",
+    .usage =
+        "usage: glint cache [OPTIONS]\n\n"
+        "Lists and checks the programs of the kernel cache, the least recently used first. Exit status: 0 "
+        "all are used,\n"
+        "3 one is damaged or not private.\n",
     .groups = {OPTIONS(command_options)}};
 
 // Returns whether all entries can be trusted.
@@ -30,7 +32,7 @@ static bool entries_print(const CacheEntries *entries)
         char used[32] = "?";
         struct tm local;
         if (localtime_r(&entry->used.tv_sec, &local)) strftime(used, sizeof used, "%Y-%m-%d %H:%M", &local);
-        const char *device = entry->device ? entry->device : "of another version of glint";
+        const char *device = entry->device ? entry->device : "(another version of glint)";
         printf("  %s  %10s  %s  %s%s\n", entry->name, text_size((double)entry->size).text, used,
                entry->fault ? "not used: " : "", entry->fault ? entry->fault : device);
         trusted = trusted && !entry->fault;

@@ -82,13 +82,15 @@ static const char *options_check(void *golden_options)
 
 static const CommandLine command_line = {
     .command = "golden",
-    .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
-             "       glint golden check [SCENE...] [OPTIONS]\n\n"
-             "Renders scenes at strict, whose bits are the same on every device. Writes a line of hashes per "
-             "scene, or compares the\n"
-             "scenes with their lines, by default all scenes of the file. If an image differs, names the "
-             "layer that differs first and\n"
-             "the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
+    .usage =
+        "usage: glint golden write SCENE... [OPTIONS]\n"
+        "       glint golden check [SCENE...] [OPTIONS]\n\n"
+        "Renders scenes at strict, whose bits are the same on every device. Writes a line of hashes per "
+        "scene, or compares the\n"
+        "scenes with their lines, by default all scenes of the file. If an image differs, prints the "
+        "first layer that\n"
+        "differs and the pixels, and writes these pixels to SCENE-golden.png in the current folder. Exit "
+        "status: 0 same, 3 different.\n",
     .groups = {OPTIONS(command_options), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(device_option),
                OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options), REPORT_OPTIONS},
     OPERANDS(ANY, GoldenOptions, scenes),

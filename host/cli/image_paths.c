@@ -53,12 +53,12 @@ bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scen
 
 bool image_output_exists(const ImageOutputOptions *options)
 {
-    ImageOutputOptions sure = *options;
-    sure.aovs &= ~(unsigned)AOV_SHADOW;
+    ImageOutputOptions without_shadow = *options;
+    without_shadow.aovs &= ~(unsigned)AOV_SHADOW;
     struct stat status;
     bool exists = true;
     char *path;
-    for (size_t i = 0; exists && (path = file_path(&sure, i)); i++) {
+    for (size_t i = 0; exists && (path = file_path(&without_shadow, i)); i++) {
         exists = stat(path, &status) == 0 && S_ISREG(status.st_mode);
         free(path);
     }

@@ -87,7 +87,7 @@ static const char *stdout_check(const RenderOptions *options)
     if (options->skips_existing) return "--skip-existing is for files, but --output is -";
     if (options->output.aovs) return "--aov writes several files, which --output - cannot hold";
     if (timing_uses_stdout(options->timing))
-        return "--timing=json and =trace print to standard output, which --output - takes";
+        return "--timing=json and =trace print to standard output, where --output - writes the image";
     return NULL;
 }
 
@@ -195,14 +195,14 @@ static const Option command_options[] = {
      FIELD(output.exposure), NUMBERS(-64, 64)},
     {"tone", "T", "tone curve of a PNG or PPM: none or filmic (default: none, which clips at 1)",
      option_choice, FIELD(output.tone), NAMES(tone_names)},
-    {"dither", NULL, "hide the steps of 8 bits in a pattern", option_flag, FIELD(output.dither)},
+    {"dither", NULL, "dither 8-bit images to hide banding", option_flag, FIELD(output.dither)},
     {"alpha", NULL, "transparent background, for PNG and EXR", option_flag, FIELD(output.alpha)},
     {"checkpoint", "FILE", "keep finished bands in FILE; the same command resumes there", option_text,
      FIELD(checkpoint)},
     {"frames", "A[-B]",
      "render these frames, or all; FILEs have %d or %04d for the number (default: NAME-%04d.png)",
      frames_read, 0},
-    {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
+    {"skip-existing", NULL, "skip images whose files exist", option_flag, FIELD(skips_existing)},
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
      FIELD(common.driver.capture_folder), .effect = effect_empty_folder},
     {"format", "F", "format of --output -: png, ppm or npy", option_choice, FIELD(output.stdout_format),
@@ -215,8 +215,8 @@ static const char *options_check(void *render_options)
     if (options->budget.limit > 0 && options->common.has_precision)
         return "--max-error chooses the precision; it cannot be combined with --precision";
     if (options->budget.limit > 0 && options->checkpoint)
-        return "--max-error may choose another precision when a checkpoint is resumed; name its choice with "
-               "--precision";
+        return "--max-error may choose another precision when a checkpoint is resumed; pass the "
+               "precision that it chose to --precision instead";
     if (options->checkpoint && options->skips_existing && options->output.path &&
         strcmp(options->checkpoint, options->output.path) == 0)
         return "--skip-existing would keep a --checkpoint of the image's name";

@@ -106,7 +106,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
     return report_close(&report);
 }
 
-// Returns whether the text starts with the magic string of NumPy's format, version 1.0.
+// Returns whether the text is a NumPy array.
 static bool is_npy(const Text *text)
 {
     return text->count >= 6 && memcmp(text->items, "\x93NUMPY", 6) == 0;
