@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/exit_status.h"
 #include "host/base/fault.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/command_line.h"
 #include "host/cli/commands.h"
@@ -45,15 +46,13 @@ static bool file_exists(const char *path)
 // Returns whether a folder of the PATH has the file, which may be one that cannot be started.
 static bool path_has(const char *name)
 {
-    bool is_there = false;
-    for (const char *at = getenv("PATH"); at && !is_there;) {
+    for (const char *at = getenv("PATH"); at;) {
         const size_t length = strcspn(at, ":");
-        char *path = text_format("%.*s/%s", length > 0 ? (int)length : 1, length > 0 ? at : ".", name);
-        is_there = file_exists(path);
-        free(path);
+        OWNED char *path = text_format("%.*s/%s", length > 0 ? (int)length : 1, length > 0 ? at : ".", name);
+        if (file_exists(path)) return true;
         at = at[length] == ':' ? at + length + 1 : NULL;
     }
-    return is_there;
+    return false;
 }
 
 // Starts glint-NAME if there is such a program on the PATH, as git does: the Python package has glint-locate.
@@ -61,7 +60,7 @@ static bool path_has(const char *name)
 static bool program_start(const char *name, char **arguments)
 {
     if (strchr(name, '/')) return false;
-    char *program = text_format("glint-%s", name);
+    OWNED char *program = text_format("glint-%s", name);
     execvp(program, arguments);
     const int error = errno; // which may be that of a folder of the PATH that cannot be searched
     const bool exists = path_has(program), is_locate = strcmp(name, "locate") == 0;
@@ -69,7 +68,6 @@ static bool program_start(const char *name, char **arguments)
         stderr_print("cannot start %s: %s", program, strerror(error));
     else if (is_locate)
         stderr_print("glint locate needs glint's Python package with the extra [locate]");
-    free(program);
     return exists || is_locate;
 }
 

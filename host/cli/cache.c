@@ -42,37 +42,27 @@ static bool entries_print(const CacheEntries *entries)
 
 static int cache_print(const char *folder)
 {
-    MessageList messages = {0};
+    PrintedMessages messages = {0};
     CacheEntries entries;
-    int status = EXIT_USER;
-    if (cache_list(&entries, &messages)) {
-        printf("%s: %zu program%s, %s of at most %s\n", folder, entries.count, text_plural(entries.count),
-               text_size((double)entries.size).text, text_size(CACHE_BYTES_MAX).text);
-        status = entries_print(&entries) ? EXIT_DONE : EXIT_CHECK;
-        cache_entries_free(&entries);
-    }
-    messages_print(&messages, NULL);
-    return status;
+    if (!cache_list(&entries, &messages)) return EXIT_USER;
+    printf("%s: %zu program%s, %s of at most %s\n", folder, entries.count, text_plural(entries.count),
+           text_size((double)entries.size).text, text_size(CACHE_BYTES_MAX).text);
+    const bool are_trusted = entries_print(&entries);
+    cache_entries_free(&entries);
+    return are_trusted ? EXIT_DONE : EXIT_CHECK;
 }
 
 int command_cache(int argument_count, char **arguments)
 {
     CacheOptions options = {0};
-    int status = command_line_read(&command_line, &options, argument_count, arguments);
+    const int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    char *folder = cache_folder_path();
+    OWNED char *folder = cache_folder_path();
     if (!folder) {
-        fputs("glint: there is no kernel cache: neither XDG_CACHE_HOME nor HOME is an absolute path\n",
-              stderr);
+        stderr_print("there is no kernel cache: neither XDG_CACHE_HOME nor HOME is an absolute path");
         return EXIT_USER;
     }
-    if (options.clears) {
-        MessageList messages = {0};
-        status = cache_clear(&messages) ? EXIT_DONE : EXIT_USER;
-        messages_print(&messages, NULL);
-    } else {
-        status = cache_print(folder);
-    }
-    free(folder);
-    return status;
+    if (!options.clears) return cache_print(folder);
+    PrintedMessages messages = {0};
+    return cache_clear(&messages) ? EXIT_DONE : EXIT_USER;
 }

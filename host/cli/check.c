@@ -165,10 +165,8 @@ static bool scene_renders(const Scene *scene, MessageList *messages)
                                       .lanes = 1,
                                       .bvh = BVH_OFF,
                                       .shift_to_eye = true};
-    CompiledScene compiled;
-    if (!scene_compile(&compiled, scene, &settings, messages)) return false;
-    compiled_scene_free(&compiled);
-    return true;
+    OwnedCompiledScene compiled = {0};
+    return scene_compile(&compiled, scene, &settings, messages);
 }
 
 static bool object_print(const Scene *scene, const char *path, uint32_t id)
@@ -178,10 +176,9 @@ static bool object_print(const Scene *scene, const char *path, uint32_t id)
         stderr_print("--object: there is no object %u; the scene has %zu", id, scene_primitive_count(scene));
         return false;
     }
-    Text text = {0};
+    OwnedText text = {0};
     object_describe(&text, scene, path, id);
     printf("%s\n", text_c(&text));
-    text_free(&text);
     return true;
 }
 
@@ -203,25 +200,22 @@ static void line_print(const char *path, const Scene *scene, bool loaded, const 
 // Reports a scene. Returns false, with messages printed, if it is not valid.
 static bool scene_check(const CheckOptions *options, const char *path)
 {
-    Scene scene = {0};
-    MessageList messages = {0};
+    OwnedScene scene = {0};
+    OwnedMessageList messages = {0};
     const SceneOptions scene_options = scene_options_of(&options->common);
-    bool loaded = scene_load(&scene, path, &scene_options, &messages) && scene_renders(&scene, &messages);
+    const bool loaded =
+        scene_load(&scene, path, &scene_options, &messages) && scene_renders(&scene, &messages);
     if (prints_json(options)) {
         json_report(path, &scene, loaded, &messages);
-        message_list_free(&messages);
-    } else {
-        if (options->scenes.count > 1) line_print(path, &scene, loaded, &messages);
-        messages_print(&messages, path);
-        if (loaded && options->object != UINT32_MAX) {
-            loaded = object_print(&scene, path, options->object);
-        } else if (loaded && options->scenes.count == 1) {
-            SceneFacts facts = facts_of(&scene);
-            text_print(path, &scene, &facts);
-        }
+        return loaded;
     }
-    scene_free(&scene);
-    return loaded;
+    if (options->scenes.count > 1) line_print(path, &scene, loaded, &messages);
+    messages_print(&messages, path);
+    if (!loaded || options->scenes.count > 1) return loaded;
+    if (options->object != UINT32_MAX) return object_print(&scene, path, options->object);
+    const SceneFacts facts = facts_of(&scene);
+    text_print(path, &scene, &facts);
+    return true;
 }
 
 int command_check(int argument_count, char **arguments)

@@ -43,10 +43,9 @@ int command_finish(int status)
 
 bool stderr_print(const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
     fprintf(stderr, "glint: %s\n", text);
-    free(text);
     return false;
 }
 
@@ -189,12 +188,10 @@ bool option_list(const Option *option, const char *value, OptionReader *read, Op
     *list.count = 0;
     for (const char *at = value;; at++) {
         const size_t length = strcspn(at, ",");
-        char *word = memory_copy_part(at, length);
-        const bool fits = *list.count < list.most;
-        if (!fits) stderr_print("--%s: expected at most %zu values", option->name, list.most);
-        const bool is_read = fits && read(&item, word, (char *)list.items + *list.count * list.item_size);
-        free(word);
-        if (!is_read) return false;
+        OWNED char *word = memory_copy_part(at, length);
+        if (*list.count == list.most)
+            return stderr_print("--%s: expected at most %zu values", option->name, list.most);
+        if (!read(&item, word, (char *)list.items + *list.count * list.item_size)) return false;
         (*list.count)++;
         at += length;
         if (*at == '\0') return true;

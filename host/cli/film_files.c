@@ -24,24 +24,20 @@ static bool layer_save(const Film *film, Layer layer, const char *path, MessageL
 {
     const ImageHeader header = film_layer_header(film, layer);
     const size_t count = film_pixel_count(film) * header.channels;
-    float *narrow = NULL;
+    OWNED float *narrow = NULL;
     if (header.npy_type == 'f') {
         narrow = memory_allocate(count, sizeof *narrow);
         numbers_narrow(narrow, film->layers[layer], count);
     }
-    const bool saved = image_write(path, &header, narrow ? narrow : film->layers[layer], messages);
-    free(narrow);
-    return saved;
+    return image_write(path, &header, narrow ? narrow : film->layers[layer], messages);
 }
 
 bool film_save(const Film *film, const char *prefix, MessageList *messages)
 {
-    bool saved = true;
-    for (Layer layer = 0; layer < LAYER_COUNT && saved; layer++) {
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (!film->layers[layer] || film_components(film, layer) == 0) continue;
-        char *path = text_format("%s.%s.npy", prefix, layer_names[layer]);
-        saved = layer_save(film, layer, path, messages);
-        free(path);
+        OWNED char *path = text_format("%s.%s.npy", prefix, layer_names[layer]);
+        if (!layer_save(film, layer, path, messages)) return false;
     }
-    return saved;
+    return true;
 }

@@ -139,23 +139,18 @@ static char *crop_write(const Film *film, const char *scene, PixelBox box)
 {
     const uint32_t width = box.right - box.left, height = box.bottom - box.top;
     const size_t row_values = 3 * (size_t)width;
-    char *path = text_format("%s-golden.png", scene + strspn(scene, "./"));
+    OWNED char *path = text_format("%s-golden.png", scene + strspn(scene, "./"));
     for (char *at = path; *at; at++)
         if (*at == '/') *at = '-'; // scenes in several folders may have the same name
-    float *pixels = memory_allocate(memory_product(row_values, height), sizeof *pixels);
+    OWNED float *pixels = memory_allocate(memory_product(row_values, height), sizeof *pixels);
     for (size_t i = 0; i < row_values * height; i++) {
         const size_t y = box.top + i / row_values;
         pixels[i] = (float)film->color[3 * (y * film->width + box.left) + i % row_values];
     }
     const ImageHeader header = {
         .format = IMAGE_PNG, .width = width, .height = height, .channels = 3, .bits = 8, .npy_type = 'f'};
-    MessageList messages = {0};
-    const bool is_written = image_write(path, &header, pixels, &messages);
-    messages_print(&messages, NULL);
-    free(pixels);
-    if (is_written) return path;
-    free(path);
-    return NULL;
+    PrintedMessages messages = {0};
+    return image_write(path, &header, pixels, &messages) ? memory_release(&path) : NULL;
 }
 
 static void lines_compare(GoldenCheck *check, const GoldenLine *golden, const GoldenLine *now,
@@ -182,7 +177,7 @@ static void lines_compare(GoldenCheck *check, const GoldenLine *golden, const Go
 // the failure.
 static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *options, Compute *compute)
 {
-    Scene scene = {0};
+    OwnedScene scene = {0};
     if (!scene_open(&scene, golden->scene, &options->common)) return EXIT_USER;
     RenderSettings settings = settings_whole(&options->common, golden->width, golden->height);
     settings.sample_count = golden->samples;
@@ -207,7 +202,6 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
             golden->tiles[i] = tile_hash(film, tile_box(film, i));
     }
     renderer_close(renderer);
-    scene_free(&scene);
     return status;
 }
 
@@ -271,15 +265,12 @@ static int scenes_write(GoldenFile *file, const GoldenOptions *options, Compute 
         golden->height = options->common.size[1];
         golden->samples = options->samples;
         golden->bounces = options->common.settings.bounce_count;
-        Film film = {0};
+        OwnedFilm film = {0};
         const int status = golden_render(golden, &film, options, compute);
-        film_free(&film);
         if (status != EXIT_DONE) return status;
     }
-    MessageList messages = {0};
-    const bool is_written = golden_file_write(file, options->file, &messages);
-    messages_print(&messages, NULL);
-    return is_written ? EXIT_DONE : EXIT_USER;
+    PrintedMessages messages = {0};
+    return golden_file_write(file, options->file, &messages) ? EXIT_DONE : EXIT_USER;
 }
 
 // Returns EXIT_DONE if the scene is the same as its line, EXIT_CHECK if not, or the status of the failure.
@@ -305,7 +296,7 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         stderr_print("'%s' has no lines", options->file);
         return EXIT_USER;
     }
-    GoldenCheck *checks = memory_allocate_zeroed(checked, sizeof *checks);
+    OWNED GoldenCheck *checks = memory_allocate_zeroed(checked, sizeof *checks);
     const ReportOptions *report = &options->common.report;
     bool continues = true;
     int status = EXIT_DONE;
@@ -322,7 +313,6 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         status = EXIT_USER;
     for (size_t i = 0; i < checked; i++)
         free(checks[i].crop);
-    free(checks);
     return status;
 }
 

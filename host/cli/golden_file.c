@@ -62,14 +62,13 @@ static bool golden_read(GoldenLine *golden, const char *line)
     for (size_t i = 0; i < TILES; i++, at += end)
         if (sscanf(at, "%4" SCNx16 "%n", &golden->tiles[i], &end) < 1) return false;
     // NOLINTEND(cert-err34-c)
-    Text written = {0};
+    OwnedText written = {0};
     golden->scene = memory_copy_text(*at == ' ' ? at + 1 : "");
     golden_append(&written, golden);
     const bool is_sound = golden->scene[0] != '\0' && strcmp(text_c(&written), line) == 0 &&
                           golden->width > 0 && golden->width <= IMAGE_SIDE_MAX && golden->height > 0 &&
                           golden->height <= IMAGE_SIDE_MAX && golden->samples > 0 &&
                           golden->samples <= SAMPLES_MAX && golden->bounces <= BOUNCES_MAX;
-    text_free(&written);
     if (is_sound) return true;
     free(golden->scene);
     golden->scene = NULL;
@@ -98,7 +97,7 @@ static char *line_add(GoldenFile *file, const char *line)
 
 bool golden_file_read(GoldenFile *file, const char *path, MessageList *messages)
 {
-    Text text = {0};
+    OwnedText text = {0};
     if (!text_read_file(&text, path, messages)) return false;
     const Source source = {path, text_c(&text), text.count};
     bool is_sound = true;
@@ -106,27 +105,22 @@ bool golden_file_read(GoldenFile *file, const char *path, MessageList *messages)
         const char *newline = memchr(text.items + start, '\n', text.count - start);
         end = newline ? (size_t)(newline - text.items) : text.count;
         const size_t length = end - start - (end > start && text.items[end - 1] == '\r');
-        char *line = memory_copy_part(text.items + start, length);
-        char *fault =
+        OWNED char *line = memory_copy_part(text.items + start, length);
+        OWNED char *fault =
             strlen(line) < length ? text_format("the line has a NUL character") : line_add(file, line);
         if (fault) message_add_at(messages, MESSAGE_ERROR, &source, start, "%s", fault);
         is_sound = is_sound && !fault;
-        free(fault);
-        free(line);
     }
-    text_free(&text);
     return is_sound;
 }
 
 bool golden_file_write(const GoldenFile *file, const char *path, MessageList *messages)
 {
-    Text text = {0};
+    OwnedText text = {0};
     text_appendf(&text, "%s\n%s\n%s", file_head[0], file_head[1], text_c(&file->comments));
     for (size_t i = 0; i < file->count; i++) {
         golden_append(&text, &file->items[i]);
         text_append(&text, "\n", 1);
     }
-    const bool is_written = output_write_file(path, text.items, text.count, messages);
-    text_free(&text);
-    return is_written;
+    return output_write_file(path, text.items, text.count, messages);
 }

@@ -49,11 +49,10 @@ static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
 {
     const Scene *scene = origin->scene;
     note_add(notes, "Scene", "%s", file_base_name(origin->scene_path));
-    Text sets = {0};
+    OwnedText sets = {0};
     for (const Source *set = scene->overrides; set; set = set->next)
         text_appendf(&sets, "%s%s", set->bytes, set->next ? "\n" : "");
     if (scene->overrides) note_add(notes, "Set", "%s", text_c(&sets));
-    text_free(&sets);
     const SceneOptions *options = origin->scene_options;
     if (options->camera) note_add(notes, "Camera", "%s", file_base_name(options->camera));
     if (options->lenient) note_add(notes, "Lenient", "yes");
@@ -66,7 +65,7 @@ typedef enum { NOTE_DEVICE, NOTE_DRIVER, NOTE_LANES, NOTE_KERNEL } DeviceNote;
 static void device_note_add(ImageNotes *notes, DeviceNote note, const ImageOrigin *origin)
 {
     static const char *const keys[] = {"Device", "Driver", "Lanes", "Kernel"};
-    Text text = {0};
+    OwnedText text = {0};
     for (size_t i = 0; i < origin->renderer_count; i++) {
         const RenderReport *report = renderer_report(origin->renderers[i]);
         if (i > 0) text_appendf(&text, " + ");
@@ -80,7 +79,6 @@ static void device_note_add(ImageNotes *notes, DeviceNote note, const ImageOrigi
             text_appendf(&text, "%016" PRIx64, renderer_kernel_hash(origin->renderers[i]));
     }
     note_add(notes, keys[note], "%s", text_c(&text));
-    text_free(&text);
 }
 
 static void precision_notes_add(ImageNotes *notes, Precision precision, const Pilot *pilot,
@@ -89,15 +87,13 @@ static void precision_notes_add(ImageNotes *notes, Precision precision, const Pi
     note_add(notes, "Precision", "%s", precision_names[precision]);
     if (pilot) {
         note_add(notes, "Budget", "%g %s", pilot->budget.limit, error_metric_names[pilot->budget.metric]);
-        Text text = {0};
+        OwnedText text = {0};
         pilot_describe(&text, pilot);
         note_add(notes, "Pilot", "%s", text_c(&text));
-        text_free(&text);
     }
     if (!counts) return;
-    char *text = counts_describe(counts);
+    OWNED char *text = counts_describe(counts);
     note_add(notes, certified_key, "%s", text);
-    free(text);
 }
 
 static void settings_notes_add(ImageNotes *notes, const RenderSettings *settings, const char *build_options)

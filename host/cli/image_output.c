@@ -159,11 +159,10 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         if (!is_written(output, &film, layer) || is_exr(output)) continue;
         ImageHeader header = film_layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
-        char *path = image_output_aov_path(output->options, layer_names[layer]);
+        OWNED char *path = image_output_aov_path(output->options, layer_names[layer]);
         output->writers[1 + layer] = image_writer_open(path, &header, messages);
         opened = output->writers[1 + layer] != NULL;
         output->bytes += (double)image_bytes(&header);
-        free(path);
     }
     return opened;
 }
@@ -279,10 +278,8 @@ static bool kept_write(ImageOutput *output, MessageList *messages)
 static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
     if (output->origin.settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
-    char *counts = counts_describe(&output->rerenders);
-    const bool written = image_writer_note(output->writers[0], &(ImageNote){certified_key, counts}, messages);
-    free(counts);
-    return written;
+    OWNED char *counts = counts_describe(&output->rerenders);
+    return image_writer_note(output->writers[0], &(ImageNote){certified_key, counts}, messages);
 }
 
 RerenderCounts image_output_rerenders(const ImageOutput *output)
@@ -309,9 +306,8 @@ static void names_print(const ImageOutput *output)
     fprintf(stderr, "glint: wrote %s", output->options->path);
     for (Layer i = 0; i < LAYER_COUNT; i++) {
         if (!output->writers[1 + i]) continue;
-        char *path = image_output_aov_path(output->options, layer_names[i]);
+        OWNED char *path = image_output_aov_path(output->options, layer_names[i]);
         fprintf(stderr, ", %s", path);
-        free(path);
     }
     fprintf(stderr, "\n");
 }

@@ -10,9 +10,8 @@
 
 char *image_output_default_path(const char *scene_path)
 {
-    char *stem = file_stem(scene_path), *path = text_format("%s.png", stem);
-    free(stem);
-    return path;
+    OWNED char *stem = file_stem(scene_path);
+    return text_format("%s.png", stem);
 }
 
 bool image_output_is_stdout(const char *path)
@@ -41,14 +40,12 @@ static char *file_path(const ImageOutputOptions *options, size_t index)
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    bool overwrites = false;
-    char *path;
-    for (size_t i = 0;
-         !image_output_is_stdout(options->path) && !overwrites && (path = file_path(options, i)); i++) {
-        overwrites = output_overwrites_scene(path, scene, scene_path);
-        free(path);
+    for (size_t i = 0; !image_output_is_stdout(options->path); i++) {
+        OWNED char *path = file_path(options, i);
+        if (!path) break;
+        if (output_overwrites_scene(path, scene, scene_path)) return true;
     }
-    return overwrites;
+    return false;
 }
 
 bool image_output_exists(const ImageOutputOptions *options)
@@ -56,11 +53,9 @@ bool image_output_exists(const ImageOutputOptions *options)
     ImageOutputOptions without_shadow = *options;
     without_shadow.aovs &= ~(unsigned)AOV_SHADOW;
     struct stat status;
-    bool exists = true;
-    char *path;
-    for (size_t i = 0; exists && (path = file_path(&without_shadow, i)); i++) {
-        exists = stat(path, &status) == 0 && S_ISREG(status.st_mode);
-        free(path);
+    for (size_t i = 0;; i++) {
+        OWNED char *path = file_path(&without_shadow, i);
+        if (!path) return true;
+        if (stat(path, &status) != 0 || !S_ISREG(status.st_mode)) return false;
     }
-    return exists;
 }

@@ -16,26 +16,22 @@ WarningReceiver device_warnings = {.deliver = warnings_print};
 const Device *device_find(DeviceList *devices, const char *selector)
 {
     device_list_open(devices, &device_warnings);
-    MessageList messages = {0};
-    const Device *device = device_choose(devices, device_selector(selector), &messages);
-    messages_print(&messages, NULL);
-    return device;
+    PrintedMessages messages = {0};
+    return device_choose(devices, device_selector(selector), &messages);
 }
 
 const Device *device_choose_numbered(const DeviceList *devices, const char *selector, size_t number,
                                      MessageList *messages)
 {
     const char *listed = device_selector(selector);
-    const Device **chosen;
+    OWNED const Device **chosen = NULL;
     const Device *first = listed ? NULL : device_choose(devices, NULL, messages);
     if (!listed && !first) return NULL;
     const size_t count = devices_choose(devices, listed ? listed : "all", &chosen, messages);
     size_t kept = 0;
     for (size_t i = 0; i < count; i++)
         if (!first || chosen[i]->type == first->type) chosen[kept++] = chosen[i];
-    const Device *device = kept > 0 ? chosen[number % kept] : NULL;
-    free(chosen);
-    return device;
+    return kept > 0 ? chosen[number % kept] : NULL;
 }
 
 void devices_apply_options(DeviceList *devices, const CommonOptions *common)
@@ -100,13 +96,11 @@ static ARRAY_OF(Compute) left;
 
 int compute_end(Compute *compute, int status)
 {
-    char *unmap_failure = compute_unmap_failure_text(compute);
+    OWNED char *unmap_failure = compute_unmap_failure_text(compute);
     if (compute_ok(compute) && unmap_failure) stderr_print("warning: %s", unmap_failure);
-    free(unmap_failure);
     if (!compute_ok(compute)) {
-        char *failure = compute_failure_text(compute);
+        OWNED char *failure = compute_failure_text(compute);
         stderr_print("%s", failure);
-        free(failure);
         status = EXIT_MACHINE;
     } else if (status != EXIT_INTERRUPTED) {
         array_push(left, *compute);

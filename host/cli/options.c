@@ -94,9 +94,13 @@ void messages_print_once(MessageList *messages, MessageList *printed, const char
 
 void messages_print(MessageList *messages, const char *path)
 {
-    MessageList printed = {0};
+    OwnedMessageList printed = {0};
     messages_print_once(messages, &printed, path);
-    message_list_free(&printed);
+}
+
+void messages_print_owned(MessageList *messages)
+{
+    messages_print(messages, NULL);
 }
 
 SceneOptions scene_options_of(const CommonOptions *common)
@@ -119,10 +123,8 @@ bool scene_open_once(Scene *scene, const char *path, const CommonOptions *common
 
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
 {
-    MessageList printed = {0};
-    const bool loaded = scene_open_once(scene, path, common, &printed);
-    message_list_free(&printed);
-    return loaded;
+    OwnedMessageList printed = {0};
+    return scene_open_once(scene, path, common, &printed);
 }
 
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path)

@@ -80,6 +80,9 @@ bool scene_open_once(Scene *scene, const char *path, const CommonOptions *common
 void messages_print_once(MessageList *messages, MessageList *printed, const char *path);
 // Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.
 void messages_print(MessageList *messages, const char *path);
+// Declares a list of messages that are printed and freed where its scope ends. It must be initialized.
+#define PrintedMessages __attribute__((cleanup(messages_print_owned))) MessageList
+void messages_print_owned(MessageList *messages);
 
 // Returns settings for a full image with the common options and one sample. The scene is not shifted to the
 // eye.

@@ -18,7 +18,7 @@ static const char *page_file(const char *name, size_t length)
 // comment.
 static void json_embed(Text *page, Json *json)
 {
-    Text text = json_close(json);
+    OwnedText text = json_close(json);
     for (const char *from = text_c(&text); *from;) {
         size_t safe = strcspn(from, "<");
         text_append(page, from, safe);
@@ -28,7 +28,6 @@ static void json_embed(Text *page, Json *json)
             from++;
         }
     }
-    text_free(&text);
 }
 
 void page_append(Text *page, const char *template, Json *report, Json *extras)

@@ -11,11 +11,10 @@ static void properties_json(Json *json, const Passport *passport)
 {
     json_begin_array(json, "properties");
     for (Property property = 0; property < PROPERTY_COUNT; property++) {
-        Text what = {0};
+        OwnedText what = {0};
         const Finding finding = passport_finding(passport, property, &what);
         json_addf(json, "{name %s finding %s value %s}", property_names[property], finding_names[finding],
                   text_c(&what));
-        text_free(&what);
     }
     json_end(json);
 }
@@ -45,10 +44,9 @@ void passports_refusals_json(Json *json, const Device *device)
 {
     json_begin_array(json, "refused");
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-        Text why = {0};
+        OwnedText why = {0};
         if (arithmetic_refuses(device, precision, &why))
             json_addf(json, "{precision %s reason %s}", precision_names[precision], text_c(&why));
-        text_free(&why);
     }
     json_end(json);
 }
@@ -58,10 +56,10 @@ static Text finding_text(const Passport *passport, Property property)
 {
     static const char *const marks[] = {
         [FINDING_SOUND] = "", [FINDING_UNUSUAL] = "unusual: ", [FINDING_BROKEN] = "BROKEN: "};
-    Text what = {0}, text = {0};
+    OwnedText what = {0};
+    Text text = {0};
     const Finding finding = passport_finding(passport, property, &what);
     text_appendf(&text, "%s%s", marks[finding], text_c(&what));
-    text_free(&what);
     return text;
 }
 
@@ -69,7 +67,7 @@ static Text finding_text(const Passport *passport, Property property)
 static void property_print(const Device *device, Property property)
 {
     const size_t count = passport_count(device);
-    Text *findings = memory_allocate_zeroed(count, sizeof *findings);
+    OWNED Text *findings = memory_allocate_zeroed(count, sizeof *findings);
     bool are_alike = true;
     for (size_t i = 0; i < count; i++) {
         findings[i] = finding_text(passport_at(device, i), property);
@@ -86,7 +84,6 @@ static void property_print(const Device *device, Property property)
     }
     for (size_t i = 0; i < count; i++)
         text_free(&findings[i]);
-    free(findings);
 }
 
 void passports_print(const Device *device)
@@ -104,18 +101,16 @@ void passports_print(const Device *device)
     for (Property property = 0; property < PROPERTY_COUNT; property++)
         property_print(device, property);
     for (Precision precision = 0; precision < PRECISION_COUNT; precision++) {
-        Text why = {0};
+        OwnedText why = {0};
         if (arithmetic_refuses(device, precision, &why))
             printf("  precision %s is refused: %s\n", precision_names[precision], text_c(&why));
-        text_free(&why);
     }
 }
 
 void passports_remark(const Device *device, FILE *stream)
 {
-    Text text = {0};
+    OwnedText text = {0};
     if (passports_abnormal(device, &text)) fprintf(stream, "%s\n", text_c(&text));
-    text_free(&text);
 }
 
 void device_heading_print(const Device *device, FILE *stream)

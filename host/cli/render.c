@@ -30,13 +30,10 @@ static char *image_path_make(const RenderOptions *options, size_t index)
     if (output && is_frame && (frame_place_of(output).start || !output_is_folder(output)))
         return frame_name_make(output, frame);
     if (output && !is_frame && options->scenes.count == 1) return memory_copy_text(output);
-    char *name = image_output_default_path(options->scenes.items[is_frame ? 0 : index]);
+    OWNED char *name = image_output_default_path(options->scenes.items[is_frame ? 0 : index]);
     if (is_frame) name[strlen(name) - strlen(".png")] = '\0';
-    char *ending = is_frame ? text_format("-%04u.png", frame) : memory_copy_text("");
-    char *path = text_format("%s%s%s%s", output ? output : "", output ? "/" : "", name, ending);
-    free(ending);
-    free(name);
-    return path;
+    OWNED char *ending = is_frame ? text_format("-%04u.png", frame) : memory_copy_text("");
+    return text_format("%s%s%s%s", output ? output : "", output ? "/" : "", name, ending);
 }
 
 // Returns whether all images have different paths, and prints an error if not.
@@ -72,18 +69,15 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
 // Mistakes in a scene are reported when it is rendered.
 static bool scene_is_overwritten(RenderOptions options, const char *path, char *const *images)
 {
-    Scene scene = {0};
-    MessageList ignored = {0};
-    bool is_overwritten = false;
+    OwnedScene scene = {0};
+    OwnedMessageList ignored = {0};
     const SceneOptions scene_options = scene_options_of(&options.common);
-    if (scene_load(&scene, path, &scene_options, &ignored))
-        for (size_t i = 0; i < options.scenes.count && !is_overwritten; i++) {
-            options.output.path = images[i];
-            is_overwritten = image_output_overwrites_scene(&options.output, &scene, path);
-        }
-    message_list_free(&ignored);
-    scene_free(&scene);
-    return is_overwritten;
+    if (!scene_load(&scene, path, &scene_options, &ignored)) return false;
+    for (size_t i = 0; i < options.scenes.count; i++) {
+        options.output.path = images[i];
+        if (image_output_overwrites_scene(&options.output, &scene, path)) return true;
+    }
+    return false;
 }
 
 bool render_command_check_overwrites(RenderCommand *command)
@@ -129,12 +123,12 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     interrupts_end_at_once(); // nothing checks the flag while a scene is read
     if (is_interrupted()) return EXIT_INTERRUPTED;
     RenderOptions of_image = *options;
-    char *checkpoint = options->checkpoint && options->frame_count > 0
-                           ? frame_name_make(options->checkpoint, options->first_frame + (uint32_t)index)
-                           : NULL;
+    OWNED char *checkpoint =
+        options->checkpoint && options->frame_count > 0
+            ? frame_name_make(options->checkpoint, options->first_frame + (uint32_t)index)
+            : NULL;
     if (checkpoint) of_image.checkpoint = checkpoint;
     const int status = image_file_render(of_image, command->paths[index], open, ranks);
-    free(checkpoint);
     return render_devices_work(open) ? status : EXIT_MACHINE;
 }
 

@@ -10,7 +10,8 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
     if (open->is_open) return true;
     const char *selector = device_selector(common->device);
     MessageList messages = {0};
-    const Device *single = NULL, **listed = NULL;
+    const Device *single = NULL;
+    OWNED const Device **listed = NULL;
     device_list_open(&open->list, &device_warnings);
     devices_apply_options(&open->list, common);
     if (open->is_single)
@@ -36,15 +37,13 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
         open->count = 0;
         device_list_close(&open->list);
     }
-    free(listed);
     return open->is_open;
 }
 
 void render_devices_drop(RenderDevices *open, size_t index)
 {
-    char *failure = compute_failure_text(open->items[index].compute);
+    OWNED char *failure = compute_failure_text(open->items[index].compute);
     stderr_print("warning: %s; the other devices render its share", failure);
-    free(failure);
     open->items[index].is_dropped = true;
 }
 
@@ -58,12 +57,11 @@ static void device_remove(RenderDevices *open, size_t index)
 }
 
 // Prints why devices cannot render the image, and that the others render their share.
-static void unfit_print(MessageList *unfit)
+static void unfit_print(const MessageList *unfit)
 {
     for (size_t i = 0; i < unfit->count; i++)
         if (unfit->items[i].severity == MESSAGE_ERROR)
             stderr_print("warning: %s; the other devices render its share", unfit->items[i].text);
-    message_list_free(unfit);
 }
 
 bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderSettings *settings,
@@ -71,16 +69,15 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
 {
     Renderer **renderers = open->renderers;
     const size_t count = open->count;
-    Compute **computes = memory_allocate(count, sizeof *computes);
-    MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
+    OWNED Compute **computes = memory_allocate(count, sizeof *computes);
+    OWNED MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each);
+    OwnedMessageList unfit = {0};
     open->is_unfit = false;
     for (size_t i = 0; i < count; i++) {
         computes[i] = open->items[i].compute;
         if (settings->precision == PRECISION_CERTIFIED &&
             !reference_open(computes[i], &open->list, open->reference_selector)) {
             open->is_unfit = true;
-            free(computes);
-            free(of_each);
             return false;
         }
     }
@@ -101,8 +98,6 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
         }
     }
     unfit_print(&unfit);
-    free(of_each);
-    free(computes);
     return is_done;
 }
 

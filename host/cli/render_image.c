@@ -75,21 +75,20 @@ static bool checkpoint_start(ImageRender *render)
     const RenderOptions *options = render->options;
     const unsigned aovs = image_output_aovs(&options->output);
     if (!options->checkpoint) return true;
-    Text key = {0};
+    OwnedText key = {0};
     checkpoint_key(&key, &render->origin, aovs);
     const FilmHeader film = renderer_film_header(render->origin.renderers[0], aovs);
     render->checkpoint = checkpoint_open(options->checkpoint, text_c(&key), &film, &render->messages);
-    text_free(&key);
     return render->checkpoint != NULL;
 }
 
 // Prints what an interrupted or failed render has left.
 static void leftovers_print(const RenderOptions *options)
 {
-    char *kept = text_format(": no image was written; an earlier %s is unchanged", options->output.path);
+    OWNED char *kept =
+        text_format(": no image was written; an earlier %s is unchanged", options->output.path);
     if (is_interrupted())
         interrupt_report(options->has_format ? ": the image on standard output is incomplete" : kept);
-    free(kept);
     if (options->checkpoint)
         stderr_print("run the same command again to continue; finished bands are in '%s'",
                      options->checkpoint);
@@ -194,10 +193,9 @@ static int precision_choose(ImageRender *render, Pilot *pilot)
     if (!chosen) return is_unfit ? EXIT_USER : is_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     render->settings.precision = pilot->chosen;
     if (options->quiet) return EXIT_DONE;
-    Text line = {0};
+    OwnedText line = {0};
     pilot_describe(&line, pilot);
     stderr_print("--max-error: %s, %.0f ms", text_c(&line), 1e3 * pilot->seconds);
-    text_free(&line);
     return EXIT_DONE;
 }
 
@@ -314,14 +312,14 @@ static int scene_render(ImageRender *render)
 
 int image_file_render(RenderOptions options, const char *path, RenderDevices *open, Ranks *ranks)
 {
-    Scene scene = {0};
+    OwnedScene scene = {0};
     const CommonOptions *common = &options.common;
     const double start = clock_seconds();
     int status = EXIT_USER;
     options.output.path = path;
     Stage *stage = options.timing == TIMING_TRACE ? stage_open(true) : NULL;
     options.common.scene.stage = options.common.settings.stage = stage;
-    MessageList printed = {0};
+    OwnedMessageList printed = {0};
     if (scene_open_once(&scene, options.scene, common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.frame = options.frame_count > 0 ? common->scene.frame : NAN,
@@ -336,8 +334,6 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
                               .printed = &printed};
         status = scene_render(&render);
     }
-    message_list_free(&printed);
-    scene_free(&scene);
     stage_close(stage);
     return status;
 }

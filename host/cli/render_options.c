@@ -147,7 +147,7 @@ static const char *several_check(const RenderOptions *options)
 // Sets the number of frames to that of the scene. Returns false with a message if it has none.
 static bool frames_count(RenderOptions *options)
 {
-    Scene scene;
+    OwnedScene scene = {0};
     MessageList messages = {0};
     const char *path = options->scenes.items[0];
     const SceneOptions scene_options = scene_options_of(&options->common);
@@ -157,7 +157,6 @@ static bool frames_count(RenderOptions *options)
         options->frame_count = scene.animation.frame_count;
         if (scene.animation.frame_count == 0)
             message_error(&messages, "--frames all: '%s' has no 'frames'; name them, such as 0-47", path);
-        scene_free(&scene);
     }
     messages_print(&messages, path);
     return is_read && options->frame_count > 0;

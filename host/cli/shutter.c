@@ -66,11 +66,10 @@ static const double *sums_add(Shutter *shutter, const Film *band)
     const bool is_divided = first_sample(shutter, 1) == shutter->sample_count;
     const double divisor = is_divided ? 1 : shutter->sample_count;
     double *sums = shutter->sums + 3 * (size_t)band->first_row * band->width;
-    double *colors = memory_allocate(count, sizeof *colors);
+    OWNED double *colors = memory_allocate(count, sizeof *colors);
     numbers_widen(colors, band->layers[LAYER_COLOR], count, band->real_size == sizeof(double));
     for (size_t i = 0; i < count; i++)
         sums[i] += colors[i] / divisor;
-    free(colors);
     return sums;
 }
 

@@ -114,24 +114,17 @@ static bool is_npy(const Text *text)
 
 static bool rays_load(RayList *rays, const TraceOptions *options)
 {
-    MessageList messages = {0};
-    Text text = {0};
-    bool read = text_read_file(&text, options->rays, &messages);
-    if (read && is_npy(&text)) {
-        message_error(
+    PrintedMessages messages = {0};
+    OwnedText text = {0};
+    if (!text_read_file(&text, options->rays, &messages)) return false;
+    if (is_npy(&text))
+        return message_error(
             &messages,
             "%s: a NumPy array; rays are text, six or eight numbers a line: origin, direction and, if "
             "given, tmin and tmax",
             options->rays);
-        read = false;
-    }
-    if (read) {
-        Source source = {options->rays, text_c(&text), text.count};
-        read = rays_read(rays, &source, &options->common, &messages);
-    }
-    messages_print(&messages, NULL);
-    text_free(&text);
-    return read;
+    const Source source = {options->rays, text_c(&text), text.count};
+    return rays_read(rays, &source, &options->common, &messages);
 }
 
 static void hit_print(const TraceHit *hit, Precision precision, FILE *file)
@@ -156,19 +149,15 @@ static void hit_print(const TraceHit *hit, Precision precision, FILE *file)
 
 static bool hits_write(const TraceOptions *options, const TraceHit *hits, size_t count)
 {
-    MessageList messages = {0};
+    PrintedMessages messages = {0};
     OutputFile output;
-    bool written = output_open(&output, options->output, &messages);
-    if (written) {
-        const Precision precision = options->common.settings.precision;
-        fprintf(output.file, "object,t,nx,ny,nz%s\n",
-                precision == PRECISION_CERTIFIED ? ",low,high,certainty" : "");
-        for (size_t i = 0; i < count; i++)
-            hit_print(&hits[i], precision, output.file);
-        written = output_commit(&output, &messages);
-    }
-    messages_print(&messages, NULL);
-    return written;
+    if (!output_open(&output, options->output, &messages)) return false;
+    const Precision precision = options->common.settings.precision;
+    fprintf(output.file, "object,t,nx,ny,nz%s\n",
+            precision == PRECISION_CERTIFIED ? ",low,high,certainty" : "");
+    for (size_t i = 0; i < count; i++)
+        hit_print(&hits[i], precision, output.file);
+    return output_commit(&output, &messages);
 }
 
 static int rays_answer(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
@@ -178,18 +167,15 @@ static int rays_answer(const TraceOptions *options, const Scene *scene, const Ra
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     messages_print(&messages, NULL);
     if (!renderer) return EXIT_USER;
-    TraceRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
-    TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
-    int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
+    OWNED TraceRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
+    OWNED TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
+    OWNED int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
     for (size_t i = 0; i < rays->count; i++)
         scaled[i] = trace_ray_scaled(rays->items[i], options->common.settings.precision, &exponents[i]);
     const bool traced = renderer_trace_closest(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         trace_hit_unscale(&hits[i], exponents[i]);
     const bool written = traced && hits_write(options, hits, rays->count);
-    free(exponents);
-    free(hits);
-    free(scaled);
     if (written) fault_output_is_complete(EXIT_DONE);
     renderer_close(renderer);
     return written ? EXIT_DONE : EXIT_USER;
@@ -200,7 +186,7 @@ int command_trace(int argument_count, char **arguments)
     TraceOptions options = {.common.settings.precision = PRECISION_SINGLE, .output = "-"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    Scene scene = {0};
+    OwnedScene scene = {0};
     RayList rays = {0};
     OpenDevice open;
     status = EXIT_USER;
@@ -214,6 +200,5 @@ int command_trace(int argument_count, char **arguments)
         status = device_close(&open, status);
     }
     free(rays.items);
-    scene_free(&scene);
     return status;
 }

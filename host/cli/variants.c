@@ -57,12 +57,10 @@ static void variant_add(VariantSet *set, const VariantOptions *options, size_t c
 
 static uint64_t file_hash(uint64_t hash, const char *path)
 {
-    Text text = {0};
-    MessageList ignored = {0};
-    if (path && text_read_file(&text, path, &ignored)) hash = hash_bytes(hash, text.items, text.count);
-    message_list_free(&ignored);
-    text_free(&text);
-    return hash;
+    OwnedText text = {0};
+    OwnedMessageList ignored = {0};
+    const bool is_read = path && text_read_file(&text, path, &ignored);
+    return is_read ? hash_bytes(hash, text.items, text.count) : hash;
 }
 
 // Returns the hash of the contents of the scene's file, meshes and textures, regardless of their names.

@@ -149,7 +149,7 @@ text_print(Verification *verification, const char *format, ...)
 static void record_print(Verification *verification, CaseRecord *record)
 {
     const VerifyResult *result = &record->result;
-    Text line = {0};
+    OwnedText line = {0};
     if (record->state == CASE_CRASHED)
         text_appendf(&line, "%25s  FAIL  %s", "", record->crash);
     else if (result->bound > 0)
@@ -164,7 +164,6 @@ static void record_print(Verification *verification, CaseRecord *record)
     }
     text_print(verification, "  %-3s %c  %-60s %s\n", result->name, verification->tier, result->title,
                text_c(&line));
-    text_free(&line);
     record->is_printed = true;
 }
 
@@ -303,10 +302,8 @@ static Json *journal_json(const Verification *verification)
 static bool precision_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
 {
     const RenderSettings settings = precision_settings(options, precision);
-    MessageList messages = {0};
-    const bool is_suitable = device_suits(compute, &settings, &messages);
-    messages_print(&messages, NULL);
-    return is_suitable;
+    PrintedMessages messages = {0};
+    return device_suits(compute, &settings, &messages);
 }
 
 static int device_verify(Verification *verification, Compute *compute)

@@ -44,10 +44,8 @@ static RatioInterval median_interval(const Series *values, double error)
         if (missed > error) break;
     }
     if (end == 0) return (RatioInterval){-INFINITY, INFINITY};
-    Series sorted = series_sorted(values);
-    RatioInterval interval = {sorted.items[end - 1], sorted.items[count - end]};
-    series_free(&sorted);
-    return interval;
+    OwnedSeries sorted = series_sorted(values);
+    return (RatioInterval){sorted.items[end - 1], sorted.items[count - end]};
 }
 
 // The verdict is slower or faster if the whole interval lies beyond `threshold`, a factor from 1, or its
@@ -93,12 +91,10 @@ Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, siz
 
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds)
 {
-    Series ratios = {0};
+    OwnedSeries ratios = {0};
     for (size_t i = 0; i < new_seconds->count && i < old_seconds->count; i++)
         series_add(&ratios, log(new_seconds->items[i] / old_seconds->items[i]));
-    double median = series_summarize(&ratios).median;
-    series_free(&ratios);
-    return median;
+    return series_summarize(&ratios).median;
 }
 
 // Returns the logarithms of seconds / divisor^exponent, as medians of REPORT_BLOCKS consecutive blocks, or of
@@ -109,11 +105,10 @@ static Series ratio_blocks(const Series *seconds, const Series *divisors, double
     const size_t block_count = count < REPORT_BLOCKS ? count : REPORT_BLOCKS;
     Series blocks = {0};
     for (size_t block = 0; block < block_count; block++) {
-        Series part = {0};
+        OwnedSeries part = {0};
         for (size_t i = block * count / block_count; i < (block + 1) * count / block_count; i++)
             series_add(&part, log(seconds->items[i]) - exponent * log(divisors->items[i]));
         series_add(&blocks, series_summarize(&part).median);
-        series_free(&part);
     }
     return blocks;
 }
@@ -126,11 +121,9 @@ static RatioInterval interval_widen(RatioInterval interval)
 Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
                                 double tolerance)
 {
-    Series blocks = ratio_blocks(new_seconds, old_seconds, 1);
+    OwnedSeries blocks = ratio_blocks(new_seconds, old_seconds, 1);
     const RatioInterval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
-    const double log_ratio = series_summarize(&blocks).median;
-    series_free(&blocks);
-    return comparison_classify(log_ratio, interval, tolerance, 1);
+    return comparison_classify(series_summarize(&blocks).median, interval, tolerance, 1);
 }
 
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
@@ -142,10 +135,9 @@ Comparison comparison_of_ends(const Series *seconds, size_t row_count, double to
     double medians[2];
     for (size_t i = 0; i < 2; i++) {
         const Series end = {.items = seconds->items + i * (seconds->count - fifth), .count = fifth};
-        Series blocks = ratio_blocks(&end, &end, 0);
+        OwnedSeries blocks = ratio_blocks(&end, &end, 0);
         intervals[i] = median_interval(&blocks, error);
         medians[i] = series_summarize(&blocks).median;
-        series_free(&blocks);
     }
     const double low = intervals[1].low - intervals[0].high, high = intervals[1].high - intervals[0].low;
     return comparison_classify(medians[1] - medians[0], (RatioInterval){low, high}, tolerance, tolerance);
@@ -166,16 +158,14 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
     double log_ratio = 0;
     for (int i = 0; i < 2; i++) {
         const double exponent = i * exponent_max;
-        Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent),
-               old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent);
+        OwnedSeries new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent),
+                    old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent);
         // the right exponent lies between these two, and the error is shared by two medians
         RatioInterval new_median = blocks_interval(&new_blocks, row_error(row_count) / 2),
                       old_median = blocks_interval(&old_blocks, row_error(row_count) / 2);
         covering.low = fmin(covering.low, new_median.low - old_median.high);
         covering.high = fmax(covering.high, new_median.high - old_median.low);
         log_ratio += (series_summarize(&new_blocks).median - series_summarize(&old_blocks).median) / 2;
-        series_free(&new_blocks);
-        series_free(&old_blocks);
     }
     return comparison_classify(log_ratio, interval_widen(covering), tolerance, 1);
 }

@@ -66,18 +66,15 @@ static const char *packages_add(EnergyMeter *meter)
     if (glob("/sys/class/powercap/intel-rapl:*", 0, NULL, &zones) != 0) return why_not;
     bool are_read = true;
     for (size_t i = 0; i < zones.gl_pathc; i++) {
-        char *name_path = text_format("%s/name", zones.gl_pathv[i]),
-             *range_path = text_format("%s/max_energy_range_uj", zones.gl_pathv[i]),
-             *energy_path = text_format("%s/energy_uj", zones.gl_pathv[i]);
+        OWNED char *name_path = text_format("%s/name", zones.gl_pathv[i]);
+        OWNED char *range_path = text_format("%s/max_energy_range_uj", zones.gl_pathv[i]);
+        OWNED char *energy_path = text_format("%s/energy_uj", zones.gl_pathv[i]);
         char name[16];
         uint64_t range;
         FILE *file = fopen(name_path, "r");
         if (file && fgets(name, sizeof name, file) && strncmp(name, "package", strlen("package")) == 0)
             are_read = number_read(range_path, &range) && counter_add(meter, energy_path, range) && are_read;
         if (file) fclose(file);
-        free(energy_path);
-        free(range_path);
-        free(name_path);
     }
     globfree(&zones);
     if (!are_read) return "most systems allow only root to read the processors' energy counters";

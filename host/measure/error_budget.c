@@ -101,7 +101,7 @@ SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, 
     const double range = fmax(sampling->color_max, seen);
     if (!isfinite(seen) || (budget->metric == ERROR_RMSE && !isfinite(range)))
         return (SampleVerdict){.error = INFINITY, .bound = INFINITY};
-    double *shares = memory_allocate(count, sizeof *shares);
+    OWNED double *shares = memory_allocate(count, sizeof *shares);
     for (size_t i = 0; i < count; i++)
         shares[i] = pixel_share(budget, reference->color + 3 * i, sample->color + 3 * i, range,
                                 sampling->display_values);
@@ -109,7 +109,6 @@ SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, 
     const double mean = part * mean_of(shares, drawn) + rest;
     const double bound = rest + (drawn > 0 ? part * mean_upper_bound(shares, drawn, sampling->risk) : 0);
     const ErrorSummary summary = error_summarize(reference->color, sample->color, 3 * count);
-    free(shares);
     switch (budget->metric) {
     case ERROR_RMSE:
         return (SampleVerdict){summary.rmse, range * sqrt(bound), range * sqrt(bound) <= budget->limit};

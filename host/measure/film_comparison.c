@@ -250,28 +250,19 @@ void accuracy_compare(AccuracyErrors *errors, const Film *reference, const Accur
     if (!reference->object) errors->why_colors_only = "the reference has colors only";
     accuracy_count_unsound(variant, &errors->nonfinite, &errors->negative);
     const size_t pixels = film_pixel_count(reference);
-    FilmComparison comparison = {
-        .reference = reference,
-        .variant = variant,
-        .edges = edges,
-        .errors = errors,
-        .expected = memory_allocate(pixels, 3 * sizeof(double)),
-        .found = memory_allocate(pixels, 3 * sizeof(double)),
-        .t_relative = memory_allocate(pixels, sizeof(float)),
-        .t_ulps = memory_allocate(pixels, sizeof(float)),
-        .normal = memory_allocate(pixels, sizeof(float)),
-    };
+    OWNED double *expected = memory_allocate(pixels, 3 * sizeof *expected);
+    OWNED double *found = memory_allocate(pixels, 3 * sizeof *found);
+    OWNED float *t_relative = memory_allocate(pixels, sizeof *t_relative);
+    OWNED float *t_ulps = memory_allocate(pixels, sizeof *t_ulps);
+    OWNED float *normal = memory_allocate(pixels, sizeof *normal);
+    const FilmComparison comparison = {reference, variant,    edges,  errors, expected,
+                                       found,     t_relative, t_ulps, normal};
     for (size_t pixel = 0; pixel < pixels; pixel++)
         pixel_compare(&comparison, pixel);
-    errors->shading = error_summarize(comparison.expected, comparison.found, 3 * errors->shading_pixels);
-    errors->t_relative.percentile_999 = percentile_999(comparison.t_relative, errors->surface_pixels);
-    errors->t_ulps.percentile_999 = percentile_999(comparison.t_ulps, errors->surface_pixels);
-    errors->normal.percentile_999 = percentile_999(comparison.normal, errors->surface_pixels);
+    errors->shading = error_summarize(expected, found, 3 * errors->shading_pixels);
+    errors->t_relative.percentile_999 = percentile_999(t_relative, errors->surface_pixels);
+    errors->t_ulps.percentile_999 = percentile_999(t_ulps, errors->surface_pixels);
+    errors->normal.percentile_999 = percentile_999(normal, errors->surface_pixels);
     errors->image = error_summarize(reference->color, variant->color, 3 * pixels);
     errors->display = display_compare(reference, variant, display_values);
-    free(comparison.expected);
-    free(comparison.found);
-    free(comparison.t_relative);
-    free(comparison.t_ulps);
-    free(comparison.normal);
 }

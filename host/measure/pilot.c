@@ -114,7 +114,7 @@ static bool rest_render(const PilotRun *run, Renderer *renderer, const RenderSet
     rest_of(settings, run->pilot->cell, rest);
     double *colors = film->color + 3 * drawn;
     for (int i = 0; i < REST_COUNT; i++) {
-        Film part;
+        OwnedFilm part = {0};
         if (rest[i].region_width == 0 || rest[i].region_height == 0) continue;
         if (!renderer_move(renderer, run->scene, &rest[i], messages) ||
             !renderer_render_film(renderer, 0, &part))
@@ -122,7 +122,6 @@ static bool rest_render(const PilotRun *run, Renderer *renderer, const RenderSet
         const size_t count = 3 * film_pixel_count(&part);
         memcpy(colors, part.color, count * sizeof *colors);
         colors += count;
-        film_free(&part);
     }
     return true;
 }
@@ -199,17 +198,14 @@ static bool candidates_measure(const PilotRun *run, const Film *reference)
         if (i == PRECISION_DOUBLE) continue;
         // precisions beyond single do more work than single, and build another kernel
         if (i > PRECISION_SINGLE && is_kept) break;
-        Film sample;
-        MessageList unfit = {0};
+        OwnedFilm sample = {0};
+        OwnedMessageList unfit = {0};
         const bool whole = sample_render(run, (Precision)i, &sample, &unfit);
-        const bool is_unfit = message_count(&unfit, MESSAGE_ERROR) > 0;
-        message_list_free(&unfit);
-        if (!whole && is_unfit) continue;
+        if (!whole && message_count(&unfit, MESSAGE_ERROR) > 0) continue;
         if (!whole) return false;
         PilotCandidate *candidate = &pilot->candidates[i];
         candidate->verdict = sample_classify(&pilot->budget, reference, &sample, &sampling);
         is_kept = is_kept || candidate->verdict.keeps;
-        film_free(&sample);
     }
     return true;
 }
@@ -226,11 +222,10 @@ bool pilot_run(Pilot *pilot, const ErrorBudget *budget, Compute *compute, const 
         .confidence = pilot_confidence,
         .image_pixels = (size_t)settings->region_width * settings->region_height,
     };
-    Film reference;
+    OwnedFilm reference = {0};
     if (!sample_render(&run, PRECISION_DOUBLE, &reference, messages)) return false;
     pilot->candidates[PRECISION_DOUBLE].verdict.keeps = true;
     const bool whole = candidates_measure(&run, &reference);
-    film_free(&reference);
     pilot->chosen = fastest_choose(pilot);
     pilot->seconds = clock_seconds() - start;
     return whole;

@@ -40,9 +40,9 @@ Summary series_summarize(const Series *series)
 {
     size_t count = series->count;
     if (count == 0) return (Summary){0};
-    Series copy = series_sorted(series);
+    OwnedSeries copy = series_sorted(series);
     const double *sorted = copy.items;
-    Summary summary = {
+    return (Summary){
         .min = sorted[0],
         .lower_quartile = sorted_quantile(sorted, count, 0.25),
         .median = sorted_quantile(sorted, count, 0.5),
@@ -50,8 +50,6 @@ Summary series_summarize(const Series *series)
         .max = sorted[count - 1],
         .count = count,
     };
-    series_free(&copy);
-    return summary;
 }
 
 void series_free(Series *series)

@@ -16,3 +16,4 @@ Series series_sorted(const Series *series); // returns an ascending copy
 Summary series_summarize(const Series *series);
 // Frees the values and sets the series to zeros.
 void series_free(Series *series);
+#define OwnedSeries __attribute__((cleanup(series_free))) Series
