@@ -318,26 +318,18 @@ static bool operands_read(const CommandLine *line, void *options, CommandOperand
     void *field = (char *)options + line->operands_offset;
     const size_t count = operands.count;
     const OperandRule rule = line->operands;
-    const bool takes_scenes = rule == OPERANDS_SCENE || rule == OPERANDS_SCENES;
-    if (takes_scenes && count == 0) return option_usage_fault(line->command, "no scene given");
-    switch (rule) {
-    case OPERANDS_NONE:
-        return count == 0 || option_usage_fault(line->command, "takes no arguments");
-    case OPERANDS_SCENE:
+    if (rule == OPERANDS_NONE) return count == 0 || option_usage_fault(line->command, "takes no arguments");
+    if (rule != OPERANDS_ANY && count == 0) return option_usage_fault(line->command, "no scene given");
+    if (rule == OPERANDS_SCENE) {
         *(const char **)field = operands.items[0];
-        if (count > 1)
-            fprintf(stderr, "glint %s: takes one scene, but '%s' is a second; see glint %s --help\n",
-                    line->command, operands.items[1], line->command);
-        return count == 1;
-    case OPERANDS_SCENES:
-    case OPERANDS_ANY:
-        break;
+        if (count == 1) return true;
+        OWNED char *what = text_format("takes one scene, but '%s' is a second", operands.items[1]);
+        return option_usage_fault(line->command, what);
     }
     *(CommandOperands *)field = operands;
-    bool are_right = true;
-    for (size_t i = 0; line->operand_check && i < count && are_right; i++)
-        are_right = line->operand_check(operands.items[i]);
-    return are_right;
+    for (size_t i = 0; line->operand_check && i < count; i++)
+        if (!line->operand_check(operands.items[i])) return false;
+    return true;
 }
 
 bool option_usage_fault(const char *command, const char *what)
@@ -397,9 +389,8 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         are_given[i] = true;
     }
     const CommandOperands operands = {arguments + optind, (size_t)(argument_count - optind)};
-    bool is_accepted = operands_read(line, options, operands) && checks_pass(line, options);
+    if (!operands_read(line, options, operands) || !checks_pass(line, options)) return EXIT_USER;
     for (size_t i = 0; i < count; i++)
-        if (are_given[i] && listed[i]->effect)
-            is_accepted = is_accepted && listed[i]->effect(listed[i], options);
-    return is_accepted ? OPTIONS_READ : EXIT_USER;
+        if (are_given[i] && listed[i]->effect && !listed[i]->effect(listed[i], options)) return EXIT_USER;
+    return OPTIONS_READ;
 }

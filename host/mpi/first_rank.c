@@ -36,10 +36,9 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)device_selector, job.device_selector_size, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)reference_selector, job.reference_selector_size, MPI_COMM_WORLD);
-    Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);
+    OWNED Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);
     MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
     memcpy(ranks->items, all + 1, ranks->remote.count * sizeof *all);
-    free(all);
     bool all_fit = true;
     for (size_t i = 0; i < ranks->remote.count; i++) {
         const Rank *rank = &ranks->items[i];
@@ -85,10 +84,9 @@ static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
     int count;
     MPI_Get_count(status, MPI_BYTE, &count);
     const bool fits = bytes && count == message_size(size);
-    void *discarded = fits ? NULL : memory_allocate((size_t)count + 1, 1);
+    OWNED void *discarded = fits ? NULL : memory_allocate((size_t)count + 1, 1);
     MPI_Recv(fits ? bytes : discarded, count, MPI_BYTE, status->MPI_SOURCE, status->MPI_TAG, MPI_COMM_WORLD,
              MPI_STATUS_IGNORE);
-    free(discarded);
     if (fits && (size_t)count < size)
         receive_bytes((char *)bytes + count, size - (size_t)count, status->MPI_SOURCE, status->MPI_TAG);
     return fits;
@@ -210,7 +208,7 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
 static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker)
 {
     const Ranks *ranks = context;
-    RankState *states = memory_allocate_zeroed(ranks->remote.count, sizeof *states);
+    OWNED RankState *states = memory_allocate_zeroed(ranks->remote.count, sizeof *states);
     for (size_t done_count = 0; done_count < ranks->remote.count;) {
         MPI_Status status;
         bool is_busy = has_message(MPI_ANY_SOURCE, MPI_ANY_TAG, &status);
@@ -228,7 +226,6 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
     }
     for (size_t i = 0; i < ranks->remote.count; i++)
         film_free(&states[i].band);
-    free(states);
 }
 
 // Returns false with a message if an option is for a single process.

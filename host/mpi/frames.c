@@ -213,7 +213,7 @@ static bool frame_send(Deal *deal, RankFrames *state, int rank)
 
 static void frames_serve(Deal *deal, size_t other_count)
 {
-    RankFrames *states = memory_allocate_zeroed(other_count, sizeof *states);
+    OWNED RankFrames *states = memory_allocate_zeroed(other_count, sizeof *states);
     for (size_t i = 0; i < other_count; i++)
         states[i].frame = NO_FRAME;
     for (size_t over_count = 0; over_count < other_count;) {
@@ -228,7 +228,6 @@ static void frames_serve(Deal *deal, size_t other_count)
         }
         if (!is_busy) poll_pause();
     }
-    free(states);
 }
 
 size_t frames_deal(RenderCommand *command, size_t other_count, int argument_count, char **arguments)
