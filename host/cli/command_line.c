@@ -35,6 +35,7 @@ int command_finish(int status)
     errno = EIO; // the error of an earlier write is lost
     if (fflush(stdout) != 0 || ferror(stdout)) {
         stderr_print("cannot write to standard output: %s", strerror(errno));
+        clearerr(stdout); // reported once
         return EXIT_MACHINE;
     }
     fault_output_is_complete(status);

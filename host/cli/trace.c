@@ -1,7 +1,6 @@
 // glint trace reads explicit rays and writes their hits as CSV.
 #include "host/base/array.h"
 #include "host/base/exit_status.h"
-#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/base/text.h"
@@ -176,9 +175,9 @@ static int rays_answer(const TraceOptions *options, const Scene *scene, const Ra
     for (size_t i = 0; i < rays->count && traced; i++)
         trace_hit_unscale(&hits[i], exponents[i]);
     const bool written = traced && hits_write(options, hits, rays->count);
-    if (written) fault_output_is_complete(EXIT_DONE);
+    const int status = written ? command_finish(EXIT_DONE) : EXIT_USER;
     renderer_close(renderer);
-    return written ? EXIT_DONE : EXIT_USER;
+    return status;
 }
 
 int command_trace(int argument_count, char **arguments)
