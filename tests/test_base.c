@@ -68,6 +68,8 @@ TEST(message_without_place)
     assert_string_equal(text, "glint: warning: one?2?\nglint: error: three\n");
     message_list_free(&messages);
     assert_int_equal(messages.count, 0);
+    message_warning(NULL, "nobody reads this");
+    assert_false(message_error(NULL, "nor %s", "this"));
 }
 
 TEST(text_grows)

@@ -86,8 +86,8 @@ Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderS
     Compute *compute = &device->compute;
     if (settings->precision == PRECISION_CERTIFIED && !compute->device->fp64 && !compute->reference &&
         compute_ok(compute)) {
-        OwnedMessageList ignored = {0}; // renderer_open names what is missing
-        const Device *reference = device_choose_reference(&device->list, NULL, &ignored);
+        // renderer_open names what is missing
+        const Device *reference = device_choose_reference(&device->list, NULL, NULL);
         if (reference) compute_open_reference(compute, reference);
     }
     return renderer_open(compute, scene, settings, messages);

@@ -42,12 +42,15 @@ static size_t character_count(const char *bytes, size_t length)
     return count;
 }
 
-// Adds the message with a text, which is freed after its copy is made printable.
+// Adds the message with a printable copy of a text, which is freed. A list of NULL receives nothing.
 static void message_push(MessageList *list, Message message, char *formatted)
 {
     message.text = printable_copy(formatted, strlen(formatted), SIZE_MAX, false);
     free(formatted);
-    array_push(*list, message);
+    if (list)
+        array_push(*list, message);
+    else
+        message_free(&message);
 }
 
 void message_warning(MessageList *list, const char *format, ...)

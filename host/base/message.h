@@ -28,7 +28,8 @@ typedef struct Source {
     struct Source *next;
 } Source;
 
-// Add a message without a file. The function for errors returns false, so that its caller can return that.
+// Add a message without a file. The list may be NULL, here and in message_add_at, where the reader wants no
+// messages. The function for errors returns false, so that its caller can return that.
 void message_warning(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool message_error(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

@@ -45,9 +45,8 @@ static void libraries_append(Text *text)
 static void release_append(Text *text)
 {
     OwnedText file = {0};
-    OwnedMessageList ignored = {0};
     static const char key[] = "PRETTY_NAME=\"";
-    const char *name = text_read_file(&file, "/etc/os-release", &ignored) ? strstr(text_c(&file), key) : NULL;
+    const char *name = text_read_file(&file, "/etc/os-release", NULL) ? strstr(text_c(&file), key) : NULL;
     if (name) {
         name += sizeof key - 1;
         text_appendf(text, "%-20s %.*s\n", "release", (int)strcspn(name, "\"\n"), name);
@@ -136,8 +135,7 @@ static void file_add(Archive *archive, const char *name)
 {
     OWNED char *path = text_format("%s/%s", archive->folder, name);
     OwnedText contents = {0};
-    OwnedMessageList ignored = {0};
-    if (!text_read_file(&contents, path, &ignored) || contents.count == 0) return;
+    if (!text_read_file(&contents, path, NULL) || contents.count == 0) return;
     if (strcmp(strrchr(name, '.'), ".cl") != 0) {
         OwnedText scrubbed = scrub(archive->scrubber, &contents);
         archive->is_written &= report_file_write(archive->folder, name, &scrubbed, archive->messages);

@@ -58,8 +58,7 @@ static void variant_add(VariantSet *set, const VariantOptions *options, size_t c
 static uint64_t file_hash(uint64_t hash, const char *path)
 {
     OwnedText text = {0};
-    OwnedMessageList ignored = {0};
-    const bool is_read = path && text_read_file(&text, path, &ignored);
+    const bool is_read = path && text_read_file(&text, path, NULL);
     return is_read ? hash_bytes(hash, text.items, text.count) : hash;
 }
 

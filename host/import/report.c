@@ -10,7 +10,7 @@ enum { MESSAGES_MAX = 20 }; // of each severity
 
 Report report_open(const Source *source, MessageList *messages)
 {
-    return (Report){.source = source, .messages = messages, .first = messages->count};
+    return (Report){.source = source, .messages = messages, .first = messages ? messages->count : 0};
 }
 
 // Counts a message, and returns whether it is within the limit.

@@ -19,6 +19,7 @@ typedef struct {
     size_t known_count;
 } Report;
 
+// Opens a report. The list may be NULL for a report that is not closed.
 Report report_open(const Source *source, MessageList *messages);
 
 // Adds a message of the severity.

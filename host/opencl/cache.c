@@ -145,9 +145,7 @@ static const char *file_read(Text *content, int folder, const char *name, uint64
         close(descriptor);
         return why ? why : "it cannot be opened";
     }
-    MessageList ignored = {0};
-    if (!text_read_open_file(content, file, name, &ignored)) why = "it cannot be read";
-    message_list_free(&ignored);
+    if (!text_read_open_file(content, file, name, NULL)) why = "it cannot be read";
     fclose(file);
     return why;
 }
@@ -176,16 +174,11 @@ static void folder_lock(int folder)
 // Writes a private file of the folder. Returns false if that fails, since the cache only saves time.
 static bool file_write(int folder, const char *name, const void *bytes, size_t size)
 {
-    MessageList ignored = {0};
     OutputFile output;
-    bool is_written = output_open_private(&output, folder, name, &ignored);
-    if (is_written && !output_write(&output, bytes, size, &ignored)) {
-        output_abandon(&output);
-        is_written = false;
-    }
-    is_written = is_written && output_commit(&output, &ignored);
-    message_list_free(&ignored);
-    return is_written;
+    if (!output_open_private(&output, folder, name, NULL)) return false;
+    if (output_write(&output, bytes, size, NULL)) return output_commit(&output, NULL);
+    output_abandon(&output);
+    return false;
 }
 
 // Reads the hash's key, after replacing one that is absent or cannot be trusted. Returns false if there is
@@ -371,11 +364,10 @@ static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 
 void cache_trim(uint64_t bytes_max, WarningReceiver *warnings)
 {
-    MessageList messages = {0}, ignored = {0};
+    MessageList messages = {0};
     int folder = folder_open(false, &messages);
     if (folder >= 0) {
-        folder_trim(folder, bytes_max, &ignored);
-        message_list_free(&ignored);
+        folder_trim(folder, bytes_max, NULL);
         close(folder);
     }
     warnings_deliver(warnings, &messages);
@@ -385,7 +377,7 @@ void cache_store(const char *key, const Text *binary, WarningReceiver *warnings)
 {
     CacheHeader header = header_of(strlen(key), binary->count);
     if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
-    MessageList messages = {0}, ignored = {0};
+    MessageList messages = {0};
     int folder = folder_open(true, &messages);
     Secret secret;
     if (folder >= 0) folder_lock(folder);
@@ -397,8 +389,7 @@ void cache_store(const char *key, const Text *binary, WarningReceiver *warnings)
         text_append(&entry, text_c(binary), binary->count);
         file_write(folder, entry_name(key).text, entry.items, entry.count);
         text_free(&entry);
-        folder_trim(folder, CACHE_BYTES_MAX, &ignored);
-        message_list_free(&ignored);
+        folder_trim(folder, CACHE_BYTES_MAX, NULL);
     }
     if (folder >= 0) close(folder);
     warnings_deliver(warnings, &messages);

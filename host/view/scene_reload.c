@@ -45,9 +45,8 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
 static Text camera_text_read(const FrameLoop *loop)
 {
     Text text = {0};
-    OwnedMessageList ignored = {0};
     const char *path = camera_path(&loop->options);
-    if (loop->options.writes_camera && !file_obstacle(path)) text_read_file(&text, path, &ignored);
+    if (loop->options.writes_camera && !file_obstacle(path)) text_read_file(&text, path, NULL);
     return text;
 }
 

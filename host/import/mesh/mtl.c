@@ -321,8 +321,8 @@ static bool library_read(MtlReader *reader, const char *path)
         if (file_is_same(reader->files.items[i], file)) return true;
     scene_file_named(reader->draft->import->options, path);
     Text text = {0};
-    MessageList ignored = {0}, messages = {0};
-    const bool is_there = !file_obstacle(path) && text_read_file(&text, path, &ignored);
+    MessageList messages = {0};
+    const bool is_there = !file_obstacle(path) && text_read_file(&text, path, NULL);
     if (is_there) {
         array_push(reader->files, file);
         const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
@@ -342,7 +342,6 @@ static bool library_read(MtlReader *reader, const char *path)
         }
         report_include(reader->draft->import->report, &reader->report);
     }
-    message_list_free(&ignored);
     text_free(&text);
     return is_there;
 }

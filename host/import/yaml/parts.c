@@ -142,12 +142,10 @@ static bool part_parse(PartsReader *reader, size_t index, Text *text, YamlTree *
     text_append(text, key, key_length);
     text_append(text, reader->source->bytes + ends[0], item + 1);
     const Source source = {.file = reader->source->file, .bytes = text->items, .length = text->count};
-    MessageList ignored = {0};
-    Report report = report_open(&source, &ignored);
+    Report report = report_open(&source, NULL);
     YamlCut cut = {.offset = key_length + item};
     const bool is_read =
         yaml_parse(part_tree, &report, reader->base + ends[0] - key_length, &source, &cut, reader->stage);
-    message_list_free(&ignored);
     if (!is_read || cut.list != PART_LIST)
         return false; // the item after it may be in the list of a later key
     reader->parts[index] =
@@ -194,11 +192,9 @@ static bool rest_parse(PartsReader *reader, YamlCut *cut)
     Text rest = {0};
     text_append(&rest, source->bytes, start);
     text_append(&rest, source->bytes + end, source->length - end);
-    MessageList ignored = {0};
-    Report report = report_open(source, &ignored);
+    Report report = report_open(source, NULL);
     const Source parsed = {.bytes = rest.items, .length = rest.count};
     const bool is_read = yaml_parse(reader->tree, &report, reader->base, &parsed, cut, reader->stage);
-    message_list_free(&ignored);
     text_free(&rest);
     return is_read;
 }
