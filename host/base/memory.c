@@ -69,7 +69,7 @@ void *memory_allocate_large(size_t count, size_t size)
     const size_t total = memory_size(count, size),
                  alignment = total >= MEMORY_LARGE_MIN ? LARGE_PAGE : DEVICE_ALIGNMENT;
     if (total > SIZE_MAX - alignment) fault("out of memory: %zu x %zu bytes", count, size);
-    const size_t rounded = (total / alignment + 1) * alignment;
+    const size_t rounded = (total + alignment - 1) / alignment * alignment;
     void *memory = memory_must(aligned_alloc(alignment, rounded), count, size);
 #ifdef MADV_HUGEPAGE
     if (alignment == LARGE_PAGE) madvise(memory, rounded, MADV_HUGEPAGE); // a hint: no harm if ignored
