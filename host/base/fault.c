@@ -15,11 +15,11 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// What a crash's message needs is global, because a signal handler has no context. noted_call is the current
+// What a crash's message needs is global, because a signal handler has no context. current_call is the
 // call of this thread, and last_call that of any thread, which stands in for drivers' threads.
-static _Thread_local const char *volatile noted_call;
+static _Thread_local const char *volatile current_call;
 static const char *_Atomic last_call;
-static const char *_Atomic noted_kernel;
+static const char *_Atomic current_kernel;
 static _Atomic int calling_threads;
 static volatile sig_atomic_t is_complete, complete_status;
 static char limits[128];
@@ -38,14 +38,14 @@ _Noreturn void fault(const char *format, ...)
 
 void fault_record_call(const char *call)
 {
-    calling_threads += (call != NULL) - (noted_call != NULL);
-    noted_call = call;
+    calling_threads += (call != NULL) - (current_call != NULL);
+    current_call = call;
     if (call) last_call = call;
 }
 
 void fault_record_kernel(const char *name)
 {
-    noted_kernel = name;
+    current_kernel = name;
 }
 
 void fault_record_crashes(char text[CRASH_TEXT_SIZE])
@@ -106,7 +106,7 @@ static void crash_append(CrashText *crash, const char *text, size_t length)
 static void crash_describe(CrashText *crash, const char *call, int signal_number)
 {
     static const char how[2][32] = {": the OpenCL driver crashed", ": the OpenCL driver aborted"};
-    const char *kernel = noted_kernel, *what = how[signal_number == SIGABRT];
+    const char *kernel = current_kernel, *what = how[signal_number == SIGABRT];
     crash_append(crash, call, strcspn(call, "("));
     crash_append(crash, what, strlen(what));
     if (kernel) {
@@ -120,7 +120,7 @@ static void crash_describe(CrashText *crash, const char *call, int signal_number
 // Prints the crash's message. Calls only functions that a signal handler may call.
 static void crash_report(int signal_number)
 {
-    const char *call = noted_call ? noted_call : calling_threads > 0 ? last_call : NULL;
+    const char *call = current_call ? current_call : calling_threads > 0 ? last_call : NULL;
     if (!call && !is_complete) {
         signal(signal_number, SIG_DFL);
         raise(signal_number);

@@ -13,7 +13,7 @@ void fault_catch_crashes(void);
 void fault_record_call(const char *call);
 // Records the kernel that the following calls build or run, which a crash's message names, or NULL for none.
 void fault_record_kernel(const char *name);
-// Makes a crash within a call write its description to `text` instead of stderr.
+// Makes a crash within a call write its description to `text`, which must be zeroed, instead of stderr.
 enum { CRASH_TEXT_SIZE = 160 };
 void fault_record_crashes(char text[CRASH_TEXT_SIZE]);
 // Declares all output complete. A later fault or crash prints a warning and the process exits with `status`.

@@ -224,7 +224,7 @@ void json_print(Json *json, FILE *stream)
 void json_print_line(Json *json, FILE *stream)
 {
     Text text = json_close(json);
-    // texts have no line breaks, so that an indent follows each
+    // jansson escapes line breaks in texts, so an indent follows each newline here
     for (const char *line = text_c(&text); *line; line += strspn(line, "\n ")) {
         const size_t length = strcspn(line, "\n");
         fwrite(line, 1, length, stream);

@@ -24,7 +24,7 @@ void json_none(Json *json, const char *key);
 void json_addf(Json *json, const char *members, ...) __attribute__((format(printf, 2, 3)));
 // Returns the document with one newline at its end, and frees the writer.
 Text json_close(Json *json);
-// Prints the document and one newline, and frees it.
+// Prints the document and one newline, and frees it. A stream that fails keeps its error, here and below.
 void json_print(Json *json, FILE *stream);
 // Prints the document on one line at once, and frees it.
 void json_print_line(Json *json, FILE *stream);

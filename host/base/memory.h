@@ -16,7 +16,7 @@ char *memory_copy_part(const char *text, size_t length); // ends the copy with a
 // Returns count * size, or ends the program by a fault if that exceeds the address space.
 size_t memory_product(size_t count, size_t size);
 
-// Sizes from this on get large pages in memory_allocate_large.
+// memory_allocate_large requests large pages for at least this many bytes.
 enum { MEMORY_LARGE_MIN = 1 << 22 };
 
 // Allocates memory that an OpenCL device can use in place, aligned for OpenCL's largest type. From
