@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -35,6 +36,17 @@ int openat(int at, const char *path, int flags, ...) // NOLINT
         return (int)syscall(SYS_openat, at, path, flags, mode);
     errno = EOPNOTSUPP;
     return -1;
+}
+
+static bool removed_are_locked;
+
+// Records whether another process would have to wait for the lock of the file.
+int unlinkat(int at, const char *path, int flags) // NOLINT
+{
+    const int other = openat(at, path, O_RDONLY | O_CLOEXEC);
+    removed_are_locked = other >= 0 && flock(other, LOCK_EX | LOCK_NB) != 0;
+    if (other >= 0) close(other);
+    return (int)syscall(SYS_unlinkat, at, path, flags);
 }
 
 int renameat(int from_at, const char *from, int to_at, const char *to) // NOLINT
@@ -191,7 +203,10 @@ TEST(abandoned_file_leaves_nothing)
         unnamed_are_refused = named == 1;
         output_write_new(&output, "kept", &messages);
         assert_int_equal(folder_count(".glint-"), named);
+        removed_are_locked = false;
         output_abandon(&output);
+        // otherwise another process could reuse the name before it is removed
+        assert_int_equal(removed_are_locked, named);
         assert_int_equal(folder_count(".glint-"), 0);
         check_content("kept", "old");
     }

@@ -305,8 +305,9 @@ bool output_commit(OutputFile *output, MessageList *messages)
 
 void output_abandon(OutputFile *output)
 {
-    if (output->file && output->file != stdout) fclose(output->file);
+    // closing the file ends its lock, after which another process may use the temporary's name
     if (output->temporary) unlinkat(output->folder, output->temporary, 0);
+    if (output->file && output->file != stdout) fclose(output->file);
     pending_drop(output);
     if (output->has_folder) close(output->folder);
     free(output->target);
