@@ -49,11 +49,12 @@ static bool pci_matches(const char *pci, const char *selector)
 static bool device_matches(const Device *device, const char *selector)
 {
     if (!selector) return true;
+    if (selector[0] == '\0') return false;
     if (strcasecmp(selector, "gpu") == 0) return (device->type & CL_DEVICE_TYPE_GPU) != 0;
     if (strcasecmp(selector, "cpu") == 0) return (device->type & CL_DEVICE_TYPE_CPU) != 0;
     return name_matches(device->name, selector) || name_matches(device->platform_name, selector) ||
            name_matches(device->board, selector) || pci_matches(device->pci, selector) ||
-           (selector[0] != '\0' && strcasecmp(device->uuid, selector) == 0);
+           strcasecmp(device->uuid, selector) == 0;
 }
 
 // Returns whether the selector is a device's index. A number such as "3090" can be part of a name instead.
@@ -173,13 +174,8 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
     size_t count = 0;
     for (const char *at = selector, *end;; at = end + 1) {
         end = is_single ? NULL : strchr(at, ',');
-        char *part = at ? memory_copy_part(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
-        const Device *device = NULL;
-        if (part && part[0] == '\0')
-            no_match_report(list, part, messages);
-        else
-            device = device_choose(list, part, messages);
-        free(part);
+        OWNED char *part = at ? memory_copy_part(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
+        const Device *device = device_choose(list, part, messages);
         if (!device) return 0;
         if (is_listed(chosen, count, device)) {
             message_error(messages, "device %u (%s) is listed twice", device->index, device->name);
