@@ -24,6 +24,7 @@ WORKS = (
     ("embedded", f"{RENDER} --precision single"),
     ("no-double,constant=16384,first=4096", f"{STRICT} --size 8x8 --samples 100"),
     (f"address=32,memory={8192 * MEBI}", STRICT),
+    ("units=0", f"{RENDER} --size 1280x4 --samples 256"),  # more samples in a row than in the first band
     ("group=1", f"{STRICT} --aov {ALL_AOVS}"),
     ("group=12,buffers=8", f"{STRICT} --aov {ALL_AOVS}"),
     ("group=12,buffers=8", TRACE),

@@ -185,6 +185,7 @@ static void limits_query(DeviceList *list, Device *device)
 {
     cl_device_id id = device->id;
     device_number(list, id, CL_DEVICE_MAX_COMPUTE_UNITS, &device->compute_units);
+    if (device->compute_units == 0) device->compute_units = 1;
     device_number(list, id, CL_DEVICE_MAX_CLOCK_FREQUENCY, &device->clock_mhz);
     device_number(list, id, CL_DEVICE_MAX_WORK_GROUP_SIZE, &device->largest_work_group);
     device_sides(list, id, device->longest_group_sides);

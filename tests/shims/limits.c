@@ -6,6 +6,7 @@
 //   toward-zero    float arithmetic does not round to nearest
 //   no-infinity    float arithmetic has no infinity and no NaN
 //   no-double      no 64-bit floating point
+//   units=N        the device has N compute units
 //   group=N        work-groups have at most N work-items, a side included
 //   constant=N     constant memory has N bytes
 //   memory=N       global memory has N bytes, over all buffers
@@ -115,6 +116,7 @@ cl_int clGetDeviceInfo(cl_device_id device, cl_device_info what, size_t size, vo
     if (!is_limited(device)) return NEXT(clGetDeviceInfo)(device, what, size, to, needed);
     if (what == CL_DEVICE_PROFILE && limit_get("embedded", NULL))
         return answer("EMBEDDED_PROFILE", sizeof "EMBEDDED_PROFILE", size, to, needed);
+    if (what == CL_DEVICE_MAX_COMPUTE_UNITS && limit_get("units", &value)) return ANSWER(cl_uint, (cl_uint)value);
     if (what == CL_DEVICE_MAX_WORK_GROUP_SIZE && limit_get("group", &value)) return ANSWER(size_t, value);
     if (what == CL_DEVICE_ADDRESS_BITS && limit_get("address", &value))
         return ANSWER(cl_uint, (cl_uint)value);
