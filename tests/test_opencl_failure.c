@@ -6,7 +6,10 @@
 #include "tests/failing/calls.h"
 #include "tests/failing/faults.h"
 #include "tests/failing/work.h"
+#include "tests/files.h"
 #include "tests/film.h"
+#include <signal.h>
+#include <sys/resource.h>
 
 // Fails a call. It must be reported if `is_needed`, else the work is done without it.
 static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)
@@ -107,6 +110,43 @@ TEST(empty_build_log)
     assert_work_is_right(NULL);
 }
 
+// A program's text that cannot be saved whole is not left behind.
+TEST(unsaved_text)
+{
+    struct rlimit usual;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &usual), 0);
+    OWNED char *folder = folder_make();
+    setenv("TMPDIR", folder, 1);
+    signal(SIGXFSZ, SIG_IGN);
+    injected = (Fault){.call = "clBuildProgram", .index = EVERY_CALL, .act = FAULT_FAIL};
+    Compute compute;
+    WorkResult result;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){1000, usual.rlim_max}), 0);
+    const bool is_done = work(&compute, &result);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &usual), 0);
+    setenv("TMPDIR", "/dev/null", 1);
+    assert_false(is_done);
+    OWNED char *text = compute_failure_text(&compute);
+    assert_non_null(strstr(text, "the composed text: could not be saved"));
+    assert_int_equal(rmdir(folder), 0);
+    compute_close_checked(&compute);
+}
+
+static char *cache_disable(void)
+{
+    char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
+    setenv("XDG_CACHE_HOME", "/dev/null", 1);
+    return cache;
+}
+
+static void cache_restore(const char *cache)
+{
+    if (cache[0] != '\0')
+        setenv("XDG_CACHE_HOME", cache, 1);
+    else
+        unsetenv("XDG_CACHE_HOME");
+}
+
 // A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
 // without a cache every program is. After a failed build, functions are built out of line.
 TEST(builds)
@@ -116,8 +156,7 @@ TEST(builds)
     calls_fail("clBuildProgram", false, false);
     calls_fail("clCreateKernel", false, false);
     calls_fail("clCreateKernel", true, false);
-    OWNED char *cache = memory_copy_text(getenv("XDG_CACHE_HOME") ? getenv("XDG_CACHE_HOME") : "");
-    setenv("XDG_CACHE_HOME", "/dev/null", 1);
+    OWNED char *cache = cache_disable();
     some_calls_fail("clCreateProgramWithSource", 1, false, false);
     call_fail("clCreateProgramWithSource", EVERY_CALL, false, true);
     some_calls_fail("clCreateKernel", 1, false, false);
@@ -126,10 +165,7 @@ TEST(builds)
     call_fail("clBuildProgram", 0, false, false); // built once more, despite PoCL's cache
     call_fail("clBuildProgram", EVERY_CALL, false, true);
     assert_work_is_right(NULL);
-    if (cache[0] != '\0')
-        setenv("XDG_CACHE_HOME", cache, 1);
-    else
-        unsetenv("XDG_CACHE_HOME");
+    cache_restore(cache);
 }
 
 // Lists the devices and chooses one. The list names the call that failed first, and so does the message if no

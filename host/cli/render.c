@@ -70,8 +70,9 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
 static bool scene_is_overwritten(RenderOptions options, const char *path, char *const *images)
 {
     OwnedScene scene = {0};
+    OwnedMessageList ignored = {0};
     const SceneOptions scene_options = scene_options_of(&options.common);
-    if (!scene_load(&scene, path, &scene_options, NULL)) return false;
+    if (!scene_load(&scene, path, &scene_options, &ignored)) return false;
     for (size_t i = 0; i < options.scenes.count; i++) {
         options.output.path = images[i];
         if (image_output_overwrites_scene(&options.output, &scene, path)) return true;

@@ -78,6 +78,7 @@ static char *text_save(const char *text)
     bool written = file && fputs(text, file) >= 0;
     if (file && fclose(file) != 0) written = false;
     if (!file && descriptor >= 0) close(descriptor);
+    if (!written && descriptor >= 0) unlink(path);
     return memory_copy_text(written ? path : "could not be saved");
 }
 
