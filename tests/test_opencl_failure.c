@@ -147,6 +147,35 @@ static void cache_restore(const char *cache)
         unsetenv("XDG_CACHE_HOME");
 }
 
+static BandRows acquire_nothing(void *context, uint32_t rows_max, uint32_t step)
+{
+    (void)context, (void)rows_max, (void)step;
+    return (BandRows){0};
+}
+
+// Builds a kernel that is not launched, and returns the number of calls of a function.
+static size_t unlaunched_calls(const char *counted)
+{
+    const BandQueue queue = {.acquire = acquire_nothing};
+    injected = (Fault){.call = counted, .act = FAULT_COUNT};
+    Compute compute;
+    compute_open(&compute, work_device);
+    Renderer *renderer = renderer_open(&compute, &work_scene, &work_settings, NULL);
+    assert_true(renderer_work(renderer, 0, &queue));
+    renderer_close(renderer);
+    compute_close_checked(&compute);
+    return injected.count;
+}
+
+// The binary of a kernel that was never launched is not asked for, since it may lack the machine code.
+TEST(unlaunched_kernel)
+{
+    OWNED char *cache = cache_disable();
+    assert_int_equal(unlaunched_calls("clBuildProgram"), 1);
+    assert_int_equal(unlaunched_calls("clGetProgramInfo"), 0);
+    cache_restore(cache);
+}
+
 // A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
 // without a cache every program is. After a failed build, functions are built out of line.
 TEST(builds)

@@ -81,7 +81,7 @@ typedef struct {
     const char *out_of_line_prelude;
     const char *kernel;  // the build fails if it cannot be created; NULL creates none
     const char *options; // compiler flags only
-    const char *launch;  // kernel and work-group size for the cache's key, such as "render 8x1"; or NULL
+    const char *launch;  // replaces --work-group in the cache's key of a passport; NULL for other programs
     bool no_cache;
 } ProgramRequest;
 
@@ -104,9 +104,9 @@ void program_options_append(Text *text, const Device *device, const char *option
 // detail has the build log and the file in which the composed text was saved. If both builds fail, the first
 // failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
-// Writes the program to the cache unless it came from there. Call it after the first launch has ended,
-// because PoCL compiles a kernel at its first launch, a binary holds only the kernels launched by then, and
-// a program loaded from it always returns that same binary (3.1; hence `launch` in the key).
+// Writes the program to the cache unless it came from there. Call it after the kernel's first launch has
+// ended, because PoCL compiles a kernel at its first launch, a binary holds only the kernels launched by
+// then, and a program loaded from it always returns that same binary (3.1).
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
 void program_close(Program *program);
 

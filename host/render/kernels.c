@@ -24,8 +24,7 @@ static void variant_close(KernelVariant *variant, Compute *compute)
 {
     for (size_t type = 0; type < KERNEL_COUNT; type++) {
         KernelSlot *slot = &variant->slots[type];
-        // since its launch, a program's binary holds finished machine code
-        if (slot->program.kernel) program_store(compute, &slot->request, &slot->program);
+        if (slot->was_launched) program_store(compute, &slot->request, &slot->program);
         program_close(&slot->program);
     }
     text_free(&variant->prelude);
@@ -118,6 +117,7 @@ double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, con
     capture_launch(compute, &(Launch){slot->program.kernel, &slot->request, slot->program.is_out_of_line,
                                       dimensions, first, items, group});
     LaunchTime time = kernel_launch(compute, slot->program.kernel, dimensions, first, items, group);
+    slot->was_launched = true;
     fault_record_kernel(NULL);
     const bool is_fixed = compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)

@@ -19,7 +19,8 @@ typedef enum {
 
 typedef struct {
     ProgramRequest request;
-    Program program; // has no kernel until it is first requested
+    Program program;   // has no kernel until it is first requested
+    bool was_launched; // its binary is then complete (program_store)
 } KernelSlot;
 
 // Kernels whose text follows the same definitions.
