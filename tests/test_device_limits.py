@@ -8,7 +8,7 @@ import os
 import re
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, POCL, ROOT, SPHERE, TestCase, main, need_device, need_pocl, npy_read, read, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, POCL, ROOT, SPHERE, TestCase, main, need_device, need_pocl, npy_read, png_read, read, shim_build, skip_all, write
 
 RENDER = "render sphere.yaml --quiet --size 320x200 -o image.npy"
 STRICT = f"{RENDER} --precision strict --lanes 1"
@@ -114,6 +114,8 @@ class DeviceLimits(TestCase):
                     self.assertEqual(device["build_from_cache"], is_cached)
                     for end in "npy", "path.npy", "t.npy":
                         self.assertSameBytes(f"one.{end}", f"image.{end}")
+                self.glint(f"{command} -o image.png", env=limited)
+                self.assertEqual(png_read("image.png")[2]["Kernel"], device["kernel_hash"])
 
     def test_is_refused(self):
         large_mesh("large.obj")

@@ -4,7 +4,6 @@
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/opencl/capture.h"
-#include "host/opencl/compose.h"
 #include <string.h>
 
 static const struct {
@@ -15,9 +14,22 @@ static const struct {
     [KERNEL_CLOSEST] = {"closest.cl", "closest"}, [KERNEL_COVERAGE] = {"coverage.cl", "coverage"},
 };
 
+static ProgramRequest request_of(const Kernels *kernels, KernelType type)
+{
+    return (ProgramRequest){
+        .root = kernel_sources[type].file,
+        .prelude = text_c(&kernels->variant.prelude),
+        .out_of_line_prelude = kernels->variant.out_of_line_prelude.items,
+        .kernel = kernel_sources[type].name,
+        .options = kernels->variant.options,
+        .no_cache = kernels->settings->no_cache,
+    };
+}
+
 char *kernels_text(const Kernels *kernels, KernelType type)
 {
-    return kernel_compose(kernel_files, kernel_sources[type].file, text_c(&kernels->variant.prelude));
+    const ProgramRequest request = request_of(kernels, type);
+    return program_request_text(&request, false);
 }
 
 static void variant_close(KernelVariant *variant, Compute *compute)
@@ -75,14 +87,7 @@ static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
 {
     Compute *compute = kernels->scene->compute;
     RenderReport *report = kernels->report;
-    slot->request = (ProgramRequest){
-        .root = kernel_sources[type].file,
-        .prelude = text_c(&kernels->variant.prelude),
-        .out_of_line_prelude = kernels->variant.out_of_line_prelude.items,
-        .kernel = kernel_sources[type].name,
-        .options = kernels->variant.options,
-        .no_cache = kernels->settings->no_cache,
-    };
+    slot->request = request_of(kernels, type);
     stage_begin(kernels->settings->stage, "building the kernel", NULL, 0);
     fault_record_kernel(slot->request.kernel);
     const double start = clock_seconds();
@@ -100,7 +105,7 @@ static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
 cl_kernel kernels_get(Kernels *kernels, KernelType type)
 {
     KernelSlot *slot = &kernels->variant.slots[type];
-    if (!slot->program.kernel) slot_build(kernels, slot, type);
+    if (!slot->program.kernel && compute_ok(kernels->scene->compute)) slot_build(kernels, slot, type);
     // AOV kernels do not change the hash that identifies an image
     const bool is_of_image = type != KERNEL_AOV && type != KERNEL_PATH && type != KERNEL_COVERAGE;
     if (is_of_image && !kernels->is_rerender) kernels->report->kernel_hash = slot->program.text_hash;

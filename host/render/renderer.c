@@ -131,10 +131,10 @@ char *renderer_kernel_text(const Renderer *renderer)
 
 uint64_t renderer_kernel_hash(const Renderer *renderer)
 {
-    char *text = renderer_kernel_text(renderer);
-    uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
-    free(text);
-    return hash;
+    const KernelSlot *slot = &renderer->passes[PASS_ALL].kernels.variant.slots[KERNEL_RENDER];
+    if (slot->program.kernel) return slot->program.text_hash;
+    OWNED char *text = renderer_kernel_text(renderer);
+    return hash_bytes(HASH_START, text, strlen(text));
 }
 
 const RenderReport *renderer_report(const Renderer *renderer)

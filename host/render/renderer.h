@@ -84,7 +84,8 @@ uint64_t renderer_scene_hash(const Renderer *renderer);
 
 // Returns the composed text of the kernel that renders, for other compilers. The caller frees it.
 char *renderer_kernel_text(const Renderer *renderer);
-// Returns the hash of that text, which the report contains once the kernel is built.
+// Returns the hash of the text from which that kernel was built or, before its build, of the text above. A
+// driver may have built another text, whose functions are out of line.
 uint64_t renderer_kernel_hash(const Renderer *renderer);
 // Clears launches, reads, bands and counted rays, so that the next render has its own report.
 void renderer_report_restart(Renderer *renderer);
