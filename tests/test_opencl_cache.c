@@ -258,7 +258,7 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);
     assert_null(entries.items[0].fault);
-    assert_string_equal(entries.items[0].device, "y");
+    assert_string_equal(entries.items[0].device, "y, z");
     assert_string_equal(entries.items[1].fault, "it is damaged");
     assert_string_equal(entries.items[1].name, strrchr(path, '/') + 1);
     assert_int_equal(entries.size, entries.items[0].size + CODE_LENGTH);

@@ -408,7 +408,7 @@ static void entry_describe(CacheEntry *entry, int folder)
         char *device = strstr(key, start);
         if (device) {
             device += strlen(start);
-            device[strcspn(device, ",\n")] = '\0';
+            device[strcspn(device, "\n")] = '\0';
         }
         entry->device = memory_copy_text(device ? device : "");
         free(key);

@@ -41,8 +41,8 @@ static char *request_key(const Device *device, const ProgramRequest *request, co
     text_appendf(&key, "\nlaunch %s\n", or_empty(request->launch));
     if (!request->launch && device->work_group[0] > 0)
         text_appendf(&key, "work-group %zux%zu\n", device->work_group[0], device->work_group[1]);
-    text_appendf(&key, "device %s %s, %s, native width %u\n", device->name, device->board, device->version,
-                 device->native_float_width);
+    text_appendf(&key, "device %s\nboard %s, %s, native width %u\n", device->name, device->board,
+                 device->version, device->native_float_width);
     text_appendf(&key, "driver %s, %s\n", device->vendor, device->driver);
     text_appendf(&key, "platform %s, %s\n", device->platform_name, device->platform_version);
     text_append(&key, text, strlen(text));
