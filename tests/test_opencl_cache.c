@@ -67,7 +67,6 @@ TEST_WITH(files_are_private, scratch_set_up, scratch_tear_down)
     OWNED char *path = cache_entry_path(key), *cache = cache_folder_path();
     assert_int_equal(mode_of(path), 0600);
     assert_int_equal(mode_of(cache), 0700);
-    assert_int_equal(mode_of(formatted("%s/hash-key", cache)), 0600);
 }
 
 static void warnings_print(void *context, MessageList *warnings)
@@ -96,99 +95,107 @@ static void load_without_rights(void *result)
     if (geteuid() != 0 || setuid(65534) == 0) load_twice(result);
 }
 
-// Expects a miss and one warning. Runs in a separate process, which may drop its privileges.
+// Expects a miss, with one warning if there is a reason. Runs in a separate process, which may drop its
+// privileges.
 static void assert_load_refused(void (*load)(void *result), const char *reason)
 {
     bool loaded = true;
     ChildEnd end = child_run(load, &loaded, sizeof loaded);
     assert_int_equal(end.status, 0);
     assert_false(loaded);
-    if (!strstr(end.errors, reason)) print_error("%s", end.errors);
-    assert_non_null(strstr(end.errors, reason));
-    assert_null(strstr(strchr(end.errors, '\n'), "warning"));
+    const bool is_right =
+        reason ? strstr(end.errors, reason) && !strstr(strchr(end.errors, '\n'), "warning") : !end.errors[0];
+    if (!is_right) print_error("%s", end.errors);
+    assert_true(is_right);
 }
 
-static void assert_refused(const char *reason)
-{
-    assert_load_refused(load_twice, reason);
-}
+// After the cache is spoiled, the key's entry is replaced when it is stored, the folder is not used, or a
+// folder stays in place of the entry.
+typedef enum { REPAIRED, UNUSED, KEPT } Then;
 
-// An entry that others may have written is not loaded, and replaced.
-TEST_WITH(entry_that_others_can_access_is_replaced, scratch_set_up, scratch_tear_down)
+static const struct {
+    const char *spoil;  // shell commands
+    const char *reason; // of the warning when the entry is loaded, or NULL for none
+    Then then;
+    bool needs_root, spares_root;
+} spoiled[] = {
+    {"rm $ENTRY", NULL, REPAIRED},
+    {"rm -r $FOLDER", NULL, REPAIRED},
+    {": > $ENTRY", "it is damaged", REPAIRED},
+    {"echo garbage > $ENTRY", "it is damaged", REPAIRED},
+    {"truncate -s -1 $ENTRY", "it is damaged", REPAIRED},
+    {"truncate -s 20G $ENTRY", "it is larger than the limit", REPAIRED},
+    {"cp $OTHER $ENTRY", NULL, REPAIRED}, // as if both keys had the same hash
+    {"chmod 620 $ENTRY", "others may access it", REPAIRED},
+    {"chmod 602 $ENTRY", "others may access it", REPAIRED},
+    {"chmod 644 $ENTRY", "others may access it", REPAIRED},
+    {"chmod 0 $ENTRY", "it cannot be opened", REPAIRED, .spares_root = true},
+    {"chown 65534 $ENTRY", "it belongs to another user", REPAIRED, .needs_root = true},
+    {"mv $ENTRY $ENTRY.moved && ln -s $ENTRY.moved $ENTRY", "it is a symbolic link", REPAIRED},
+    {"rm $ENTRY && mkfifo -m 600 $ENTRY", "it is not a regular file", REPAIRED},
+    {"rm $ENTRY && mkdir -m 700 $ENTRY", "it is not a regular file", KEPT},
+    {"chmod 770 $FOLDER", "others may access it", UNUSED},
+    {"chown 65534 $FOLDER", "it belongs to another user", UNUSED, .needs_root = true},
+    {"mv $FOLDER $FOLDER.moved && ln -s $FOLDER.moved $FOLDER", "it is a symbolic link", UNUSED},
+    {"rm -r $FOLDER && echo in the way > $FOLDER", "Not a directory", UNUSED}, // stops even root
+};
+
+static void spoiled_check(const char *entry, Then then)
 {
-    static const mode_t modes[] = {0620, 0602, 0644};
-    OWNED char *path = cache_entry_path(key);
-    for (size_t i = 0; i < COUNT_OF(modes); i++) {
-        store(key);
-        assert_int_equal(chmod(path, modes[i]), 0);
-        assert_refused("others may access it");
+    struct stat status;
+    bool used = true;
+    switch (then) {
+    case REPAIRED:
         store(key);
         assert_true(loads(key));
-        assert_int_equal(mode_of(path), 0600);
-    }
-}
-
-// Nothing is loaded from a folder that belongs to another user, or stored in it.
-TEST_WITH(folder_of_others_is_not_used, scratch_set_up, scratch_tear_down)
-{
-    OWNED char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
-    assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
-    for (int type = 0; type < 3; type++) {
-        store(key);
-        assert_true(loads(key));
-        if (type == 0) {
-            assert_int_equal(chmod(cache, 0770), 0);
-        } else if (type == 1) {
-            assert_int_equal(rename(cache, moved), 0);
-            assert_int_equal(symlink(moved, cache), 0);
-        } else if (geteuid() == 0) {
-            assert_int_equal(chown(cache, 65534, 65534), 0);
-        } else {
-            continue;
-        }
-        static const char *const reasons[] = {"others may access it", "it is a symbolic link",
-                                              "it belongs to another user"};
-        assert_refused(reasons[type]);
-        assert_int_equal(unlink(path), 0);
-        bool used = true;
+        assert_int_equal(lstat(entry, &status), 0);
+        assert_int_equal(status.st_mode, S_IFREG | 0600);
+        assert_int_equal(status.st_uid, geteuid());
+        break;
+    case UNUSED:
+        unlink(entry);
         assert_int_equal(child_run(store_and_list, &used, sizeof used).status, 0);
         assert_false(used);
-        assert_int_equal(access(path, F_OK), -1);
-        if (type == 0) {
-            assert_int_equal(chmod(cache, 0700), 0);
-        } else if (type == 1) {
-            assert_int_equal(unlink(cache), 0);
-            assert_int_equal(rename(moved, cache), 0);
-        }
+        assert_int_equal(access(entry, F_OK), -1);
+        break;
+    case KEPT:
+        store(key);
+        assert_false(loads(key));
+        assert_int_equal(rmdir(entry), 0);
     }
 }
 
-// Entries are useless without the key of their hash. A key that others may know is replaced.
-TEST_WITH(hash_key_that_others_can_know_is_replaced, scratch_set_up, scratch_tear_down)
+// A pipe that nobody writes into is not waited for.
+TEST(spoiled_caches)
 {
-    OWNED char *cache = cache_folder_path(), *secret = text_format("%s/hash-key", cache);
-    store(key);
-    assert_int_equal(chmod(secret, 0640), 0);
-    assert_refused("the key of its hash cannot be read");
-    store("another key");
-    assert_true(loads("another key"));
-    assert_refused("it is damaged"); // written with the earlier key
-    assert_int_equal(truncate(secret, 31), 0);
-    store(key);
-    assert_true(loads(key));
-    assert_int_equal(mode_of(secret), 0600);
+    alarm(60);
+    for (size_t i = 0; i < COUNT_OF(spoiled); i++) {
+        if (spoiled[i].needs_root && geteuid() != 0) continue;
+        scratch_set_up(NULL);
+        OWNED char *entry = cache_entry_path(key), *other = cache_entry_path("another key"),
+                   *folder = cache_folder_path();
+        setenv("ENTRY", entry, 1);
+        setenv("OTHER", other, 1);
+        setenv("FOLDER", folder, 1);
+        store(key);
+        store("another key");
+        print_message("%s\n", spoiled[i].spoil);
+        assert_int_equal(system(spoiled[i].spoil), 0); // NOLINT(cert-env33-c)
+        if (!spoiled[i].spares_root || geteuid() != 0) assert_load_refused(load_twice, spoiled[i].reason);
+        spoiled_check(entry, spoiled[i].then);
+        scratch_tear_down(NULL);
+    }
+    alarm(0);
 }
 
-// A file of 20 GB without contents is not read, and goes first.
-TEST_WITH(entry_that_is_too_large_is_not_read, scratch_set_up, scratch_tear_down)
+// Such an entry is removed first, however recently it was used, and none is stored.
+TEST_WITH(entry_that_is_too_large_is_removed, scratch_set_up, scratch_tear_down)
 {
     store(key);
-    store("another key");
     OWNED char *path = cache_entry_path(key);
     assert_int_equal(truncate(path, (off_t)20 << 30), 0);
-    assert_refused("it is larger than the limit");
     entry_set_used(key, 1u << 31);
-    cache_trim(CACHE_BYTES_MAX, NULL);
+    store("another key");
     assert_int_equal(access(path, F_OK), -1);
     assert_true(loads("another key"));
 
@@ -200,8 +207,8 @@ TEST_WITH(entry_that_is_too_large_is_not_read, scratch_set_up, scratch_tear_down
     binary.count = 0;
 }
 
-// Four processes on an empty cache make one key of the hash, so that all load what each stores.
-TEST_WITH(processes_on_an_empty_cache_share_a_hash_key, scratch_set_up, scratch_tear_down)
+// Four processes on an empty cache all load what each stores.
+TEST_WITH(processes_share_an_empty_cache, scratch_set_up, scratch_tear_down)
 {
     enum { PROCESSES = 4, ROUNDS = 20 };
     for (int round = 0; round < ROUNDS; round++) {
@@ -270,19 +277,32 @@ TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
     assert_int_equal(messages.count, 0);
 }
 
+typedef struct {
+    bool is_cleared;
+    char text[256];
+} Clearing;
+
+static void clear_without_rights(void *result)
+{
+    Clearing *clearing = result;
+    if (geteuid() == 0 && (chown(scratch, 65534, 65534) != 0 || setuid(65534) != 0)) _exit(9);
+    OWNED char *folder = cache_folder_path();
+    OwnedMessageList messages = {0};
+    store(key);
+    chmod(folder, 0500);
+    clearing->is_cleared = cache_clear(&messages);
+    chmod(folder, 0700);
+    if (messages.count == 1) snprintf(clearing->text, sizeof clearing->text, "%s", messages.items[0].text);
+}
+
 TEST_WITH(failure_to_clear_is_reported, scratch_set_up, scratch_tear_down)
 {
-    OwnedMessageList messages = {0};
-    OWNED char *path = cache_folder_path(), *secret;
-    assert_true(asprintf(&secret, "%s/hash-key", path) > 0);
-    store(key);
-    assert_true(cache_clear(&messages));
-    assert_int_equal(mkdir(secret, 0700), 0);
-    assert_false(cache_clear(&messages));
-    assert_int_equal(messages.count, 1);
-    assert_string_equal(messages.items[0].text,
-                        "cannot remove 'hash-key' of the kernel cache: Is a directory");
-    rmdir(secret);
+    Clearing clearing = {.is_cleared = true};
+    assert_int_equal(child_run(clear_without_rights, &clearing, sizeof clearing).status, 0);
+    assert_false(clearing.is_cleared);
+    OWNED char *path = cache_entry_path(key);
+    assert_string_equal(clearing.text, formatted("cannot remove '%s' of the kernel cache: Permission denied",
+                                                 strrchr(path, '/') + 1));
 }
 
 TEST_WITH(folder_without_rights_is_not_used, scratch_set_up, scratch_tear_down)
@@ -351,54 +371,6 @@ TEST_WITH(damaged_entry_is_not_loaded, scratch_set_up, scratch_tear_down)
     assert_true(loads(key));
 }
 
-// The entry of one key lies where another is looked for, as if both had the same hash.
-TEST_WITH(entry_of_another_key_is_not_loaded, scratch_set_up, scratch_tear_down)
-{
-    store("another key");
-    store(key);
-    OWNED char *from = cache_entry_path("another key"), *to = cache_entry_path(key);
-    assert_int_equal(rename(from, to), 0);
-    assert_false(loads(key));
-}
-
-TEST_WITH(entry_without_rights_is_replaced, scratch_set_up, scratch_tear_down)
-{
-    store(key);
-    OWNED char *path = cache_entry_path(key);
-    assert_int_equal(chmod(path, 0), 0);
-    if (geteuid() != 0) assert_false(loads(key));
-    store(key);
-    assert_true(loads(key));
-}
-
-// What is not an entry is replaced when the key is stored. A pipe that nobody writes into is not waited for.
-TEST_WITH(foreign_entry_is_replaced, scratch_set_up, scratch_tear_down)
-{
-    OWNED char *path = cache_entry_path(key), *other = cache_entry_path("another key");
-    alarm(60);
-    for (int type = 0; type < 3; type++) {
-        store(key);
-        if (type == 0) {
-            assert_int_equal(unlink(path), 0);
-            assert_int_equal(mkfifo(path, 0600), 0);
-        } else if (type == 1) {
-            assert_int_equal(rename(path, other), 0);
-            assert_int_equal(symlink(other, path), 0);
-        } else if (geteuid() == 0) {
-            assert_int_equal(chown(path, 65534, 65534), 0);
-        } else {
-            continue;
-        }
-        assert_false(loads(key));
-        store(key);
-        assert_true(loads(key));
-        struct stat status;
-        assert_int_equal(lstat(path, &status), 0);
-        assert_true(S_ISREG(status.st_mode) && status.st_uid == geteuid());
-    }
-    alarm(0);
-}
-
 TEST_WITH(missing_folder_disables_cache, scratch_set_up, scratch_tear_down)
 {
     const char *before = getenv("HOME");
@@ -425,30 +397,14 @@ TEST_WITH(missing_folder_disables_cache, scratch_set_up, scratch_tear_down)
         unsetenv("HOME");
 }
 
-// A file in place of the folder stops even root.
-TEST_WITH(unwritable_folder_disables_cache, scratch_set_up, scratch_tear_down)
+TEST_WITH(unusable_folder_cannot_be_listed, scratch_set_up, scratch_tear_down)
 {
-    OWNED char *path = NULL;
-    assert_true(asprintf(&path, "%s/glint", scratch) > 0);
-    file_write_bytes(path, "in the way", 10);
-    store(key);
-    assert_false(loads(key));
+    file_write(formatted("%s/glint", scratch), "in the way");
     CacheEntries entries;
     OwnedMessageList messages = {0};
     assert_false(cache_list(&entries, &messages));
     assert_int_equal(messages.count, 1);
     assert_non_null(strstr(messages.items[0].text, "is not used: Not a directory"));
-}
-
-TEST_WITH(folder_in_place_of_an_entry_is_kept, scratch_set_up, scratch_tear_down)
-{
-    store(key);
-    OWNED char *path = cache_entry_path(key);
-    assert_int_equal(unlink(path), 0);
-    assert_int_equal(mkdir(path, 0700), 0);
-    assert_false(loads(key));
-    store(key);
-    assert_false(loads(key));
 }
 
 // While two processes replace the entry, a reader always finds it whole.
@@ -474,45 +430,58 @@ TEST_WITH(readers_find_whole_entries, scratch_set_up, scratch_tear_down)
     assert_true(loads(key));
 }
 
-// The entries that were used last stay, whenever they were stored.
-TEST_WITH(least_recently_used_entries_are_trimmed, scratch_set_up, scratch_tear_down)
+// Gives an entry a size, without contents, and the time of its last use.
+static void entry_resize(const char *entry_key, off_t size, time_t used)
+{
+    OWNED char *path = cache_entry_path(entry_key);
+    assert_int_equal(truncate(path, size), 0);
+    entry_set_used(entry_key, used);
+}
+
+static bool is_stored(const char *entry_key)
+{
+    OWNED char *path = cache_entry_path(entry_key);
+    return access(path, F_OK) == 0;
+}
+
+// The entries that were used last stay, whenever they were stored. Other files stay in any case.
+TEST_WITH(least_recently_used_entries_are_removed, scratch_set_up, scratch_tear_down)
 {
     static const char *const keys[] = {"key a", "key b", "key c", "key d"};
     enum { KEY_COUNT = COUNT_OF(keys) };
-    for (int i = 0; i < KEY_COUNT; i++) {
-        store(keys[i]);
-        entry_set_used(keys[i], 1000 + i);
-    }
-    assert_true(loads("key a"));
-    OWNED char *path = cache_entry_path("key a");
+    _Static_assert(KEY_COUNT * CACHE_ENTRY_BYTES_MAX == CACHE_BYTES_MAX,
+                   "the largest entries fill the cache");
     struct stat status;
-    assert_int_equal(stat(path, &status), 0);
-    *strrchr(path, '/') = '\0';
-    uint64_t size = (uint64_t)status.st_size;
-    cache_trim(KEY_COUNT * size, NULL);
-    for (int i = 1; i < KEY_COUNT; i++) {
-        OWNED char *kept = cache_entry_path(keys[i]);
-        assert_int_equal(access(kept, F_OK), 0);
-    }
-    cache_trim(2 * size + size / 2, NULL);
-    assert_false(loads("key b"));
-    assert_false(loads("key c"));
-    assert_true(loads("key d"));
+    store("key a");
+    entry_set_used("key a", 1000);
     assert_true(loads("key a"));
-    static const char *const others[] = {"notes", "0123456789abcdef.txt", "0123456789abcdef.bin.old"};
-    static const char left_over[] = ".0123456789abcdef.bin.glint-0";
-    int cache = open(path, O_RDONLY | O_DIRECTORY);
-    for (size_t i = 0; i < 3; i++)
-        close(openat(cache, others[i], O_CREAT | O_WRONLY, 0600));
-    close(openat(cache, left_over, O_CREAT | O_WRONLY, 0600));
-    cache_trim(0, NULL);
-    assert_false(loads("key a"));
-    assert_int_equal(faccessat(cache, left_over, F_OK, 0), -1);
-    for (size_t i = 0; i < 3; i++) {
-        assert_int_equal(faccessat(cache, others[i], F_OK, 0), 0);
-        assert_int_equal(unlinkat(cache, others[i], 0), 0);
-    }
-    close(cache);
+    OWNED char *path = cache_entry_path("key a"), *folder = cache_folder_path();
+    assert_int_equal(stat(path, &status), 0);
+    assert_true(status.st_mtim.tv_sec > 1000);
+    for (int i = 1; i < KEY_COUNT; i++)
+        store(keys[i]);
+    for (int i = 0; i < KEY_COUNT; i++)
+        entry_resize(keys[i], CACHE_ENTRY_BYTES_MAX, i == 0 ? 2000 : 1000 + i);
+
+    static const char *const others[] = {"notes", "0123456789abcdef.txt", "0123456789abcdef.bin.old",
+                                         ".0123456789abcdef.bin.glint-0"};
+    enum { OTHERS = COUNT_OF(others) - 1 }; // the last is a temporary of a process that was killed
+    for (size_t i = 0; i <= OTHERS; i++)
+        file_write(formatted("%s/%s", folder, others[i]), "");
+    entry_resize("key a", CACHE_ENTRY_BYTES_MAX - status.st_size, 2000);
+    store("key e"); // as large as that of a was
+    for (int i = 0; i < KEY_COUNT; i++)
+        assert_true(is_stored(keys[i]));
+    entry_resize("key a", CACHE_ENTRY_BYTES_MAX - status.st_size + 1, 2000);
+    store("key e");
+    assert_false(is_stored("key b"));
+    assert_true(is_stored("key a") && is_stored("key c") && is_stored("key d") && loads("key e"));
+
+    OwnedMessageList messages = {0};
+    assert_true(cache_clear(&messages));
+    assert_false(is_stored("key a") || is_stored("key e"));
+    for (size_t i = 0; i <= OTHERS; i++)
+        assert_int_equal(access(formatted("%s/%s", folder, others[i]), F_OK), i < OTHERS ? 0 : -1);
 }
 
 TEST_MAIN(NULL, NULL)

@@ -3,6 +3,14 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <unistd.h>
+
+// Closes a descriptor unless it is negative. For OwnedDescriptor, which does so where its scope ends.
+static inline void file_close(const int *descriptor)
+{
+    if (*descriptor >= 0) close(*descriptor);
+}
+#define OwnedDescriptor __attribute__((cleanup(file_close))) int
 
 // FILE_REMOVED: the file is locked but had lost its last name before.
 typedef enum { FILE_LOCKED, FILE_BUSY, FILE_REMOVED } FileLock;

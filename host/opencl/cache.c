@@ -4,6 +4,7 @@
 #include "host/opencl/cache.h"
 
 #include "host/base/array.h"
+#include "host/base/file.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
@@ -14,15 +15,13 @@
 #include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 static const char cache_magic[] = "glintprg"; // stored without its null
-static const uint64_t cache_format = 2;
+static const uint64_t cache_format = 3;
 
-enum { TAG_BYTES = crypto_generichash_BYTES, SECRET_BYTES = crypto_generichash_KEYBYTES };
+enum { TAG_BYTES = crypto_generichash_BYTES };
 
 typedef struct {
     char magic[8];
@@ -30,27 +29,17 @@ typedef struct {
     unsigned char tag[TAG_BYTES]; // of the fields above, the key and the binary
 } CacheHeader;
 
-typedef struct {
-    unsigned char bytes[SECRET_BYTES];
-} Secret;
-
-static CacheHeader header_of(uint64_t key_length, uint64_t binary_length)
+static CacheHeader header_of(const char *key, uint64_t key_length, const char *binary, uint64_t binary_length)
 {
     CacheHeader header = {.format = cache_format, .key_length = key_length, .binary_length = binary_length};
     memcpy(header.magic, cache_magic, sizeof header.magic);
-    return header;
-}
-
-// Computes the keyed hash of an entry.
-static void entry_tag(unsigned char *tag, const Secret *secret, const CacheHeader *header, const char *key,
-                      const char *binary)
-{
     crypto_generichash_state state;
-    crypto_generichash_init(&state, secret->bytes, sizeof secret->bytes, TAG_BYTES);
-    crypto_generichash_update(&state, (const unsigned char *)header, offsetof(CacheHeader, tag));
-    crypto_generichash_update(&state, (const unsigned char *)key, header->key_length);
-    crypto_generichash_update(&state, (const unsigned char *)binary, header->binary_length);
-    crypto_generichash_final(&state, tag, TAG_BYTES);
+    crypto_generichash_init(&state, NULL, 0, TAG_BYTES);
+    crypto_generichash_update(&state, (const unsigned char *)&header, offsetof(CacheHeader, tag));
+    crypto_generichash_update(&state, (const unsigned char *)key, key_length);
+    crypto_generichash_update(&state, (const unsigned char *)binary, binary_length);
+    crypto_generichash_final(&state, header.tag, TAG_BYTES);
+    return header;
 }
 
 char *cache_folder_path(void)
@@ -74,10 +63,8 @@ static EntryName entry_name(const char *key)
 
 char *cache_entry_path(const char *key)
 {
-    char *folder = cache_folder_path();
-    char *path = folder ? text_format("%s/%s", folder, entry_name(key).text) : NULL;
-    free(folder);
-    return path;
+    OWNED char *folder = cache_folder_path();
+    return folder ? text_format("%s/%s", folder, entry_name(key).text) : NULL;
 }
 
 // Returns why a file or folder cannot be trusted, or NULL if it can.
@@ -103,9 +90,9 @@ static void folders_make(char *path)
 }
 
 // Opens the cache's folder. Returns -1 on failure, with a message unless it does not exist.
-static int folder_open(bool makes, MessageList *messages)
+static int cache_folder_open(bool makes, MessageList *messages)
 {
-    char *path = cache_folder_path();
+    OWNED char *path = cache_folder_path();
     if (!path) return -1;
     if (makes) folders_make(path);
     struct stat status;
@@ -118,20 +105,17 @@ static int folder_open(bool makes, MessageList *messages)
         why = "it is a symbolic link";
     else if (error != ENOENT)
         why = strerror(error);
-    if (why) {
-        message_warning(messages, "the kernel cache '%s' is not used: %s", path, why);
-        if (folder >= 0) close(folder);
-        folder = -1;
-    }
-    free(path);
-    return folder;
+    if (!why) return folder;
+    message_warning(messages, "the kernel cache '%s' is not used: %s", path, why);
+    if (folder >= 0) close(folder);
+    return -1;
 }
 
 static const char absent[] = "absent";
 
-// Reads a file of the folder without blocking. Returns NULL if the file can be trusted, `absent` if there is
-// none, else why it cannot be trusted.
-static const char *file_read(Text *content, int folder, const char *name, uint64_t bytes_max)
+// Reads an entry's file without blocking. Returns NULL if the file can be trusted, `absent` if there is none,
+// else why it cannot be trusted.
+static const char *entry_file_read(Text *content, int folder, const char *name)
 {
     int descriptor = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
     if (descriptor < 0)
@@ -139,7 +123,7 @@ static const char *file_read(Text *content, int folder, const char *name, uint64
     struct stat status;
     const char *why =
         fstat(descriptor, &status) == 0 ? distrust(&status, S_IFREG) : "its status cannot be read";
-    if (!why && (uint64_t)status.st_size > bytes_max) why = "it is larger than the limit";
+    if (!why && status.st_size > CACHE_ENTRY_BYTES_MAX) why = "it is larger than the limit";
     FILE *file = why ? NULL : fdopen(descriptor, "rb");
     if (!file) {
         close(descriptor);
@@ -148,45 +132,6 @@ static const char *file_read(Text *content, int folder, const char *name, uint64
     if (!text_read_open_file(content, file, name, NULL)) why = "it cannot be read";
     fclose(file);
     return why;
-}
-
-static const char secret_name[] = "hash-key";
-
-// Reads the hash's key. Returns false if it is absent or cannot be trusted.
-static bool secret_read(Secret *secret, int folder)
-{
-    Text content = {0};
-    const bool is_read =
-        !file_read(&content, folder, secret_name, SECRET_BYTES) && content.count == SECRET_BYTES;
-    if (is_read) memcpy(secret->bytes, content.items, SECRET_BYTES);
-    text_free(&content);
-    return is_read;
-}
-
-// Locks the folder until it is closed, so that one process at a time makes or removes the hash's key and
-// writes entries with it. Without locks, entries may be lost.
-static void folder_lock(int folder)
-{
-    while (flock(folder, LOCK_EX) != 0 && errno == EINTR)
-        continue;
-}
-
-// Writes a private file of the folder. Returns false if that fails, since the cache only saves time.
-static bool file_write(int folder, const char *name, const void *bytes, size_t size)
-{
-    OutputFile output;
-    if (!output_open_private(&output, folder, name, NULL)) return false;
-    if (output_write(&output, bytes, size, NULL)) return output_commit(&output, NULL);
-    output_abandon(&output);
-    return false;
-}
-
-// Reads the hash's key, after replacing one that is absent or cannot be trusted. Returns false if there is
-// none then. The folder must be locked.
-static bool secret_make(Secret *secret, int folder)
-{
-    return secret_read(secret, folder) || (getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES &&
-                                           file_write(folder, secret_name, secret->bytes, SECRET_BYTES));
 }
 
 typedef struct {
@@ -201,10 +146,10 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
 {
     *entry = (Entry){0};
     Text *content = &entry->content;
-    const char *why = file_read(content, folder, name, CACHE_ENTRY_BYTES_MAX);
+    const char *why = entry_file_read(content, folder, name);
     if (why) return why;
     static const char damaged[] = "it is damaged";
-    CacheHeader header, expected;
+    CacheHeader header;
     enum { VERSION_BYTES = offsetof(CacheHeader, key_length) }; // of every version's header
     if (content->count < VERSION_BYTES) return damaged;
     memcpy(&header, content->items, VERSION_BYTES);
@@ -218,10 +163,8 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     entry->key_length = (size_t)header.key_length;
     entry->binary = entry->key + entry->key_length;
     entry->binary_length = rest - entry->key_length;
-    expected = header_of(entry->key_length, entry->binary_length);
-    Secret secret;
-    if (!secret_read(&secret, folder)) return "the key of its hash cannot be read";
-    entry_tag(expected.tag, &secret, &expected, entry->key, entry->binary);
+    const CacheHeader expected =
+        header_of(entry->key, entry->key_length, entry->binary, entry->binary_length);
     return memcmp(&header, &expected, sizeof header) == 0 ? NULL : damaged;
 }
 
@@ -236,24 +179,19 @@ static void warnings_deliver(WarningReceiver *warnings, MessageList *messages)
 bool cache_load(const char *key, Text *binary, WarningReceiver *warnings)
 {
     MessageList messages = {0};
-    int folder = folder_open(false, &messages);
-    bool found = false;
-    if (folder >= 0) {
-        EntryName name = entry_name(key);
-        Entry entry;
-        const char *why = entry_read(&entry, folder, name.text);
-        found = !why && entry.key_length == strlen(key) && memcmp(entry.key, key, entry.key_length) == 0;
-        if (found) {
-            text_append(binary, entry.binary, entry.binary_length);
-            utimensat(folder, name.text, NULL, 0); // most recently used
-        } else if (why && why != absent) {
-            char *path = cache_entry_path(key);
-            message_warning(&messages, "the cached kernel '%s' is not used: %s", path, why);
-            free(path);
-        }
-        text_free(&entry.content);
-        close(folder);
+    OwnedDescriptor folder = cache_folder_open(false, &messages);
+    const EntryName name = entry_name(key);
+    Entry entry = {0};
+    const char *why = folder < 0 ? absent : entry_read(&entry, folder, name.text);
+    const bool found = !why && entry.key_length == strlen(key) && memcmp(entry.key, key, strlen(key)) == 0;
+    if (found) {
+        text_append(binary, entry.binary, entry.binary_length);
+        utimensat(folder, name.text, NULL, 0); // most recently used
+    } else if (why && why != absent) {
+        OWNED char *path = cache_entry_path(key);
+        message_warning(&messages, "the cached kernel '%s' is not used: %s", path, why);
     }
+    text_free(&entry.content);
     warnings_deliver(warnings, &messages);
     return found;
 }
@@ -277,10 +215,8 @@ static bool starts_with_entry_name(const char *name)
 static bool is_temporary(const char *name)
 {
     if (name[0] != '.' || !starts_with_entry_name(name + 1)) return false;
-    char *entry = memory_copy_part(name + 1, ENTRY_NAME_LENGTH);
-    bool is_of_entry = output_is_temporary(name, entry);
-    free(entry);
-    return is_of_entry;
+    OWNED char *entry = memory_copy_part(name + 1, ENTRY_NAME_LENGTH);
+    return output_is_temporary(name, entry);
 }
 
 void cache_entries_free(CacheEntries *entries)
@@ -335,13 +271,6 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
     return true;
 }
 
-// Removes a file. Returns false with a message if that fails, unless the file is gone.
-static bool file_remove(int folder, const char *name, MessageList *messages)
-{
-    if (unlinkat(folder, name, 0) == 0 || errno == ENOENT) return true;
-    return message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
-}
-
 // Removes the least recently used entries beyond `bytes_max`, including those too large to load, or all
 // entries if it is 0. Returns false with messages if a removal fails.
 static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
@@ -355,43 +284,34 @@ static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
     for (size_t i = 0; i < entries.count; i++) {
         bool is_too_large = entries.items[i].size > CACHE_ENTRY_BYTES_MAX;
         if (bytes_max > 0 && left <= bytes_max && !is_too_large) continue; // an entry may be empty
-        is_trimmed &= file_remove(folder, entries.items[i].name, messages);
+        const char *name = entries.items[i].name;
+        if (unlinkat(folder, name, 0) != 0 && errno != ENOENT)
+            is_trimmed =
+                message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
         if (!is_too_large) left -= entries.items[i].size;
     }
     cache_entries_free(&entries);
     return is_trimmed;
 }
 
-void cache_trim(uint64_t bytes_max, WarningReceiver *warnings)
-{
-    MessageList messages = {0};
-    int folder = folder_open(false, &messages);
-    if (folder >= 0) {
-        folder_trim(folder, bytes_max, NULL);
-        close(folder);
-    }
-    warnings_deliver(warnings, &messages);
-}
-
 void cache_store(const char *key, const Text *binary, WarningReceiver *warnings)
 {
-    CacheHeader header = header_of(strlen(key), binary->count);
-    if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
+    const size_t key_length = strlen(key);
+    if (sizeof(CacheHeader) + key_length + binary->count > CACHE_ENTRY_BYTES_MAX) return;
     MessageList messages = {0};
-    int folder = folder_open(true, &messages);
-    Secret secret;
-    if (folder >= 0) folder_lock(folder);
-    if (folder >= 0 && secret_make(&secret, folder)) {
-        Text entry = {0};
-        entry_tag(header.tag, &secret, &header, key, text_c(binary));
-        text_append(&entry, (const char *)&header, sizeof header);
-        text_append(&entry, key, strlen(key));
-        text_append(&entry, text_c(binary), binary->count);
-        file_write(folder, entry_name(key).text, entry.items, entry.count);
-        text_free(&entry);
+    OwnedDescriptor folder = cache_folder_open(true, &messages);
+    OutputFile output;
+    // a failure only costs a later run a build
+    if (folder >= 0 && output_open_private(&output, folder, entry_name(key).text, NULL)) {
+        const CacheHeader header = header_of(key, key_length, text_c(binary), binary->count);
+        if (output_write(&output, &header, sizeof header, NULL) &&
+            output_write(&output, key, key_length, NULL) &&
+            output_write(&output, binary->items, binary->count, NULL))
+            output_commit(&output, NULL);
+        else
+            output_abandon(&output);
         folder_trim(folder, CACHE_BYTES_MAX, NULL);
     }
-    if (folder >= 0) close(folder);
     warnings_deliver(warnings, &messages);
 }
 
@@ -403,7 +323,7 @@ static void entry_describe(CacheEntry *entry, int folder)
     if (entry->fault == absent) {
         entry->fault = NULL;
     } else if (!entry->fault) {
-        char *key = memory_copy_part(read.key, read.key_length);
+        OWNED char *key = memory_copy_part(read.key, read.key_length);
         static const char start[] = "\ndevice ";
         char *device = strstr(key, start);
         if (device) {
@@ -411,7 +331,6 @@ static void entry_describe(CacheEntry *entry, int folder)
             device[strcspn(device, "\n")] = '\0';
         }
         entry->device = memory_copy_text(device ? device : "");
-        free(key);
     }
     text_free(&read.content);
 }
@@ -420,23 +339,18 @@ bool cache_list(CacheEntries *entries, MessageList *messages)
 {
     *entries = (CacheEntries){0};
     const size_t earlier_count = messages->count;
-    int folder = folder_open(false, messages);
+    OwnedDescriptor folder = cache_folder_open(false, messages);
     if (folder < 0) return messages->count == earlier_count;
     const bool is_listed = entries_list(entries, folder, messages);
     for (size_t i = 0; i < entries->count; i++)
         entry_describe(&entries->items[i], folder);
-    close(folder);
     return is_listed;
 }
 
 bool cache_clear(MessageList *messages)
 {
     const size_t earlier_count = messages->count;
-    int folder = folder_open(false, messages);
+    OwnedDescriptor folder = cache_folder_open(false, messages);
     if (folder < 0) return messages->count == earlier_count;
-    folder_lock(folder);
-    bool is_cleared = folder_trim(folder, 0, messages);
-    is_cleared &= file_remove(folder, secret_name, messages);
-    close(folder);
-    return is_cleared;
+    return folder_trim(folder, 0, messages);
 }

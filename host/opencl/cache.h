@@ -3,10 +3,9 @@
 // without either there is no cache. An entry is named by the hash of its key and contains the whole key, so
 // that keys are never confused. Many processes can use the cache, because entries are written to a temporary
 // and renamed. Entries are machine code. The folder and its files are used only if they belong to the user
-// and nobody else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a
-// file of the folder). No function fails because of an entry. An untrusted entry counts as absent, with one
-// warning per receiver, and is replaced if the folder can be trusted. An entry that cannot be written is
-// discarded.
+// and nobody else may access them, and an entry only if its hash (BLAKE2b) is right. No function fails
+// because of an entry. An untrusted entry counts as absent, with one warning per receiver, and is replaced if
+// the folder can be trusted. An entry that cannot be written is discarded.
 #pragma once
 
 #include "host/base/text.h"
@@ -17,13 +16,11 @@
 // Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists.
 // `warnings` may be NULL in all functions.
 bool cache_load(const char *key, Text *binary, WarningReceiver *warnings);
-// Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX. An entry above CACHE_ENTRY_BYTES_MAX is
-// discarded.
+// Replaces the key's entry, and removes the least recently used ones beyond CACHE_BYTES_MAX. An entry above
+// CACHE_ENTRY_BYTES_MAX is discarded.
 void cache_store(const char *key, const Text *binary, WarningReceiver *warnings);
 
 enum { CACHE_BYTES_MAX = 128 << 20, CACHE_ENTRY_BYTES_MAX = 32 << 20 }; // several hundred programs
-// Removes the least recently used entries until at most `bytes_max` bytes are left.
-void cache_trim(uint64_t bytes_max, WarningReceiver *warnings);
 
 typedef struct {
     char *name;        // of the file
@@ -43,8 +40,8 @@ typedef struct {
 // folder cannot be trusted or read.
 bool cache_list(CacheEntries *entries, MessageList *messages);
 void cache_entries_free(CacheEntries *entries);
-// Removes all entries and the hash's key. Returns false with a message if the folder cannot be trusted or
-// read, or an entry cannot be removed.
+// Removes all entries. Returns false with a message if the folder cannot be trusted or read, or an entry
+// cannot be removed.
 bool cache_clear(MessageList *messages);
 
 // Return the cache's folder and the path of the key's entry, or NULL without a cache. The caller frees them.
