@@ -54,7 +54,7 @@ static size_t records_sample_size(const Pass *pass, const LaunchRange *range)
     return 32 * launch_range_flag_words(range) * nodes * RECORD_WORDS * sizeof(uint32_t);
 }
 
-// Returns how many bytes at most may record ray trees. They are behind the film in its buffer.
+// Returns the maximum size of the records of ray trees, which follow the film in its buffer.
 static size_t records_size_max(const Pass *pass, size_t film_size)
 {
     const Device *device = pass->compute->device;
@@ -68,7 +68,7 @@ static size_t records_size_max(const Pass *pass, size_t film_size)
 
 void band_record(Pass *pass, BandBuffers *buffers, const LaunchRange *range)
 {
-    const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
+    const size_t samples = samples_rendered(&pass->settings),
                  fitting = buffers->records_size / records_sample_size(pass, range);
     buffers->records.slots = (uint32_t)(32 * launch_range_flag_words(range));
     buffers->records.first_sample = pass->settings.first_sample;
@@ -82,8 +82,7 @@ void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film fil
     const LaunchRange range = launch_range_of_rows(pass, (BandRows){0, film.height});
     const size_t film_size = band_film_layout(&film, aovs, buffers);
     if (records && pass_records(pass)) {
-        const size_t samples = pass->settings.sample_count - pass->settings.first_sample,
-                     needed = samples * records_sample_size(pass, &range),
+        const size_t needed = samples_rendered(&pass->settings) * records_sample_size(pass, &range),
                      most = records_size_max(pass, film_size);
         buffers->records_size = needed < most ? needed : most;
         buffers->records.begin = (uint32_t)(film_size / ARENA_UNIT);

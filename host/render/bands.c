@@ -140,7 +140,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     pace_begin_band(pace); // the last render's band may belong to another scene or size
     bool continues = compute_ok(compute);
     while (continues) {
-        uint32_t wanted = band_rows(pass, pace, end - settings->first_sample, buffers.rows);
+        uint32_t wanted = band_rows(pass, pace, samples_rendered(settings), buffers.rows);
         BandRows rows = queue->acquire(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();

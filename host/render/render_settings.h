@@ -85,6 +85,12 @@ static inline uint32_t samples_end(const RenderSettings *settings)
     return settings->end_sample > 0 ? settings->end_sample : settings->sample_count;
 }
 
+// Returns how many samples of each pixel are rendered.
+static inline uint32_t samples_rendered(const RenderSettings *settings)
+{
+    return samples_end(settings) - settings->first_sample;
+}
+
 // Returns false with a message if the settings do not fit the device.
 bool settings_fit(const RenderSettings *settings, const Compute *compute, MessageList *messages);
 

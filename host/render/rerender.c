@@ -168,7 +168,7 @@ bool band_rerender(Pass *pass, KernelType type, unsigned layers, BandBuffers *bu
     if (is_whole) list = flagged_list(pass, rows, words, word_count);
     free(words);
     const bool has_samples = type != KERNEL_AOV && type != KERNEL_PATH;
-    const uint32_t samples = has_samples ? samples_end(&pass->settings) - pass->settings.first_sample : 1;
+    const uint32_t samples = has_samples ? samples_rendered(&pass->settings) : 1;
     buffers->rerenders.rerendered += (uint64_t)list.count * samples;
     for (Pass *next = pass_next(pass); next && is_whole && list.count > 0; next = pass_next(next)) {
         flags_raise(&band, &list, (uint32_t)next->type);
