@@ -111,7 +111,7 @@ void capture_launch(Compute *compute, const Launch *launch)
     sizes_write(json, "items", launch->dimensions, launch->items);
     sizes_write(json, "group", launch->dimensions, launch->group);
     json_begin_array(json, "arguments");
-    // such a released kernel may have had more arguments
+    // an earlier, released kernel at this address may have had more arguments
     cl_uint argument_count = 0;
     is_written =
         is_written && compute_try(compute, clGetKernelInfo(launch->kernel, CL_KERNEL_NUM_ARGS,

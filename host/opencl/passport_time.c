@@ -93,7 +93,7 @@ static double timer_ratio(const Measurement *measurement)
 
 void timer_measure(Measurement *measurement)
 {
-    const double sure = 1e-6; // exceeds the rounding error of a double of the seconds since 1970
+    const double timestamp_error = 1e-6; // exceeds the rounding error of a double of the seconds since 1970
     TimerFindings *timer = &measurement->passport->timer;
     // on a busy machine the host may wait much longer than an event lasts, but hardly each time or for long
     // ones
@@ -110,7 +110,8 @@ void timer_measure(Measurement *measurement)
         if (time->start_seconds == 0 && time->end_seconds == 0) continue;
         is_absent = false;
         is_counter = is_counter && seconds < 1.5e-9;
-        goes_back = goes_back || seconds < 0 || (i > 0 && time->start_seconds < before->end_seconds - sure);
+        goes_back = goes_back || seconds < 0 ||
+                    (i > 0 && time->start_seconds < before->end_seconds - timestamp_error);
         timer->step_nanoseconds =
             greatest_divisor(timer->step_nanoseconds, (uint64_t)llround(1e9 * time->event_seconds));
     }

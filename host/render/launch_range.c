@@ -7,10 +7,11 @@ static TileShape item_shape(uint32_t lanes)
     return (TileShape){width * MACRO_TILE_COLUMNS_OF(lanes), height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
-// Returns the work-items of a group, by --work-group or before the device's limits apply. Square groups are
-// coherent, since neighboring pixels hit the same objects. A work-item that renders whole tiles is alone in
-// its group, because PoCL places the private variables of a group's items next to each other. 64 sets of
-// them, each with the rays waiting behind glass, would exceed the cache.
+// Returns the preferred size of a work-group in work-items, which is that of --work-group if given. The
+// device's limits are applied later. Square groups are coherent, since neighboring pixels hit the same
+// objects. A work-item that renders whole tiles is alone in its group, because PoCL places the private
+// variables of a group's items next to each other. 64 sets of them, each with the rays waiting behind glass,
+// would exceed the cache.
 static TileShape group_items(const Pass *pass)
 {
     const Device *device = pass->compute->device;

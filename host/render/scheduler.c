@@ -96,7 +96,7 @@ static double share_of(const Scheduler *scheduler, size_t worker)
     return scheduler->workers[worker].rows_per_second / (mean * (double)scheduler->active_count);
 }
 
-// Adds rows to the free ones, or removes them, all of which are there.
+// Marks rows as free or as not free. All of them must be in the other state.
 static void rows_set_free(Scheduler *scheduler, BandRows rows, bool is_free)
 {
     memset(scheduler->is_free + rows.first_row, is_free, rows.row_count);
@@ -139,7 +139,8 @@ static double others_seconds(const Scheduler *scheduler, size_t worker)
     return least;
 }
 
-// Returns the most rows that a worker which has others next to it gets. The fastest worker always gets some.
+// Returns the largest number of rows for a worker that shares the image with others. The fastest worker
+// always gets some.
 static uint32_t rows_fair(const Scheduler *scheduler, size_t worker, uint32_t step)
 {
     const double pace = scheduler->workers[worker].rows_per_second, left = scheduler->free_count;
@@ -170,7 +171,7 @@ static bool rows_are_out(const Scheduler *scheduler)
     return false;
 }
 
-// Takes rows if there are any for the worker now. Otherwise *waits tells whether there may be rows later.
+// Acquires rows if there are any for the worker now. Otherwise *waits tells whether there may be rows later.
 static BandRows rows_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step,
                              bool *waits)
 {
@@ -219,7 +220,7 @@ static void band_forward(Scheduler *scheduler, const Film *band)
         scheduler->has_ended = true;
 }
 
-// Takes the next band from the waiting ones. Returns false if it is not among them.
+// Removes the next band from the waiting ones. Returns false if it is not among them.
 static bool waiting_acquire(Scheduler *scheduler, Film *band)
 {
     for (size_t i = 0; i < scheduler->waiting.count; i++) {
