@@ -202,7 +202,7 @@ class TestCase(unittest.TestCase):
 
     def skip_if_refused(self, reason):
         """Skips the test if the reason is that the default device's arithmetic does not have a precision."""
-        refusal = re.search(r"precision (\w+) relies on arithmetic .*", reason)
+        refusal = re.search(r"lacks arithmetic that precision (\w+) relies on.*", reason)
         if refusal and refusal[1] in refused_precisions():
             self.skipTest(refusal[0])
 

@@ -71,7 +71,7 @@ static void devices_write(Text *text, const DeviceList *list)
     for (size_t i = 0; i < list->count; i++) {
         const Device *device = &list->items[i];
         const char *why;
-        text_appendf(text, "%s%u (%s, %s", i ? "; " : "; there are: ", device->index, device->name,
+        text_appendf(text, "%s%u (%s, %s", i ? "; " : "; the devices are: ", device->index, device->name,
                      device_type_name(device->type));
         if (!device_usable(device, &why)) text_appendf(text, ", unusable: %s", why);
         text_append(text, ")", 1);
@@ -82,7 +82,7 @@ static void devices_write(Text *text, const DeviceList *list)
 static void advice_write(Text *text, const DeviceList *list)
 {
     if (fault_limits()[0] != '\0') {
-        text_appendf(text, "; a driver may not load within that");
+        text_appendf(text, "; a driver may need more");
         return;
     }
     text_appendf(text, "; PoCL runs on any CPU: `apt install pocl-opencl-icd` on Debian and Ubuntu");

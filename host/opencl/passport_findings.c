@@ -48,11 +48,11 @@ static Finding fma_finding(const Passport *passport, Text *text)
         if (passport->uses_fma) return FINDING_SOUND;
         if (passport->fma_cost < PASSPORT_FMA_COST_MAX) text_appendf(text, ", but not claimed in hardware");
     } else {
-        text_appendf(text, "rounds twice");
+        text_appendf(text, "not fused (rounds twice)");
         if (passport->mode == PASSPORT_DOUBLE) return FINDING_BROKEN;
     }
     text_appendf(text, passport->fma_is_exact ? "; kernels compute it from products and sums"
-                                              : "; products and sums do not replace it");
+                                              : "; its emulation by products and sums is not exact");
     return passport->fma_is_exact ? FINDING_UNUSUAL : FINDING_BROKEN;
 }
 
@@ -76,7 +76,7 @@ static Finding results_finding(const Passport *passport, const RoundedResults *r
     }
     if (results->largest_ulp <= allowed_ulp)
         return passport->mode == PASSPORT_DOUBLE ? FINDING_UNUSUAL : FINDING_SOUND;
-    text_appendf(text, "; %g are allowed", allowed_ulp);
+    text_appendf(text, "; OpenCL allows %g ulp", allowed_ulp);
     return FINDING_BROKEN;
 }
 
@@ -97,7 +97,8 @@ static Finding timers_finding(const TimerFindings *timer, Text *text)
         return FINDING_SOUND;
     }
     text_appendf(text, "%s", passport_timer_faults[timer->fault]);
-    if (timer->fault == TIMER_UNIT) text_appendf(text, " but some %.2g of them", timer->tick_nanoseconds);
+    if (timer->fault == TIMER_UNIT)
+        text_appendf(text, "; one unit is about %.2g ns", timer->tick_nanoseconds);
     return FINDING_UNUSUAL;
 }
 

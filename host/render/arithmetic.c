@@ -21,8 +21,8 @@ const Passport *arithmetic_passport(Compute *compute, Precision precision, uint3
 static bool passport_refuses(const Passport *passport, Text *why)
 {
     if (!passport_broken(passport, why)) return false;
-    text_appendf(why, " (%s, %u %s)", passport_mode_names[passport->mode], passport->lanes,
-                 passport->lanes == 1 ? "lane" : "lanes");
+    text_appendf(why, " (%s, %u lane%s)", passport_mode_names[passport->mode], passport->lanes,
+                 text_plural(passport->lanes));
     return true;
 }
 
@@ -40,15 +40,12 @@ bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageL
             compute_check_reference(compute); // it may be `runs` that failed
             return false;
         }
-        Text why = {0};
-        const bool is_refused = needs[precision].relies && passport_refuses(passport, &why);
-        if (is_refused)
-            message_error(messages,
-                          "precision %s relies on arithmetic that the device \"%s\" does not have: %s; "
-                          "precision single does not need it, but may exceed its error bounds",
-                          precision_names[precision], device->name, text_c(&why));
-        text_free(&why);
-        if (is_refused) return false;
+        OwnedText why = {0};
+        if (needs[precision].relies && passport_refuses(passport, &why))
+            return message_error(messages,
+                                 "the device \"%s\" lacks arithmetic that precision %s relies on: %s; "
+                                 "precision single renders, but its errors may be larger than documented",
+                                 device->name, precision_names[precision], text_c(&why));
     }
     return true;
 }
