@@ -51,9 +51,8 @@ static char *request_key(const Device *device, const ProgramRequest *request, co
 
 char *program_key(const Device *device, const ProgramRequest *request)
 {
-    char *text = program_request_text(request, false), *key = request_key(device, request, text);
-    free(text);
-    return key;
+    OWNED char *text = program_request_text(request, false);
+    return request_key(device, request, text);
 }
 
 static char *build_log(const Compute *compute, cl_program program)
@@ -97,18 +96,16 @@ static void cache_disk_describe(Text *text)
                      free_kibi);
 }
 
-// A build and its kernel if one is requested.
+// A built program, and the call that failed.
 typedef struct {
-    cl_program program;
-    cl_kernel kernel;
+    Program built;
     const char *failed_call; // or NULL
     cl_int status;
 } Build;
 
 static void build_release(Build *build)
 {
-    if (build->kernel) clReleaseKernel(build->kernel);
-    if (build->program) clReleaseProgram(build->program);
+    program_close(&build->built);
     *build = (Build){0};
 }
 
@@ -124,18 +121,15 @@ static bool build_check(Build *build, const char *call, cl_int status, bool is_t
 // Records a failed build as the Compute's failure and releases it.
 static void build_report(Compute *compute, Build *build, const char *text, const char *options)
 {
-    if (build->program && strcmp(build->failed_call, "clBuildProgram") == 0) {
-        char *log = build_log(compute, build->program), *path = text_save(text);
-        Text reason = {0};
+    if (build->built.program && strcmp(build->failed_call, "clBuildProgram") == 0) {
+        OWNED char *log = build_log(compute, build->built.program), *path = text_save(text);
+        OwnedText reason = {0};
         text_appendf(&reason, "options \"");
         program_options_append(&reason, compute->device, options);
         text_appendf(&reason, "\"\n%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
         cache_disk_describe(&reason);
         compute_fail(compute, build->failed_call, build->status, "%s\nthe composed text: %s", text_c(&reason),
                      path);
-        text_free(&reason);
-        free(path);
-        free(log);
     } else {
         compute_check_object(compute, NULL, build->status, build->failed_call);
     }
@@ -145,7 +139,7 @@ static void build_report(Compute *compute, Build *build, const char *text, const
 static bool build_run(Build *build, const Device *device, const Text *options)
 {
     fault_record_call("clBuildProgram");
-    cl_int status = clBuildProgram(build->program, 1, &device->id, text_c(options), NULL, NULL);
+    cl_int status = clBuildProgram(build->built.program, 1, &device->id, text_c(options), NULL, NULL);
     return build_check(build, "clBuildProgram", status, true);
 }
 
@@ -162,8 +156,8 @@ static void kernel_create(Build *build, const char *name)
     if (!name) return;
     cl_int status;
     fault_record_call("clCreateKernel");
-    build->kernel = clCreateKernel(build->program, name, &status);
-    build_check(build, "clCreateKernel", status, build->kernel);
+    build->built.kernel = clCreateKernel(build->built.program, name, &status);
+    build_check(build, "clCreateKernel", status, build->built.kernel);
 }
 
 // Writes `contents` to a file of the device's kernel folder named by the hash of the kernel's text, unless
@@ -172,17 +166,15 @@ static void kernel_file_write(const Device *device, const char *text, const char
                               const char *contents)
 {
     const uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
-    char *path = text_format("%s/%016" PRIx64 ".%s", device->kernel_folder, hash, ending);
+    OWNED char *path = text_format("%s/%016" PRIx64 ".%s", device->kernel_folder, hash, ending);
     FILE *file = fopen(path, mode);
     bool written = file ? fputs(contents, file) >= 0 : errno == EEXIST;
     if (file && fclose(file) != 0) written = false;
     if (!written && device->warnings) {
-        MessageList messages = {0};
+        OwnedMessageList messages = {0};
         message_warning(&messages, "cannot write '%s': %s", path, strerror(errno));
         device->warnings->deliver(device->warnings->context, &messages);
-        message_list_free(&messages);
     }
-    free(path);
 }
 
 // Appends a build to the log of its kernel.
@@ -191,15 +183,13 @@ static void build_log_keep(const Compute *compute, const Build *build, const cha
 {
     const Device *device = compute->device;
     if (!device->kernel_folder) return;
-    Text entry = {0};
+    OwnedText entry = {0};
     fault_record_call("clGetProgramBuildInfo");
-    char *log = build_log(compute, build->program);
+    OWNED char *log = build_log(compute, build->built.program);
     fault_record_call(NULL);
     text_appendf(&entry, "device: %s, %s\noptions: %s\nbuild: %s, %.3f s\n%s\n", device->name, device->driver,
                  options, cl_status_name(build->status), seconds, log);
     kernel_file_write(device, text, "log", "a", text_c(&entry));
-    free(log);
-    text_free(&entry);
 }
 
 static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request,
@@ -208,9 +198,9 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     Build build = {0};
     cl_int status;
     fault_record_call("clCreateProgramWithSource");
-    build.program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
-    if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
-    Text options = {0};
+    build.built.program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
+    if (!build_check(&build, "clCreateProgramWithSource", status, build.built.program)) return build;
+    OwnedText options = {0};
     program_options_append(&options, compute->device, request->options);
     if (bypasses_driver_cache) unused_option_append(&options);
     // before the build, which may crash
@@ -218,7 +208,6 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     const double start = clock_seconds();
     const bool is_built = build_run(&build, compute->device, &options);
     build_log_keep(compute, &build, text, text_c(&options), clock_seconds() - start);
-    text_free(&options);
     if (is_built) kernel_create(&build, request->kernel);
     return build;
 }
@@ -243,13 +232,13 @@ static Build build_from_binary(const Compute *compute, const Text *binary, const
     const unsigned char *bytes = (const unsigned char *)text_c(binary);
     cl_int binary_status, status;
     fault_record_call("clCreateProgramWithBinary");
-    build.program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
-                                              &bytes, &binary_status, &status);
-    if (build_check(&build, "clCreateProgramWithBinary", status, build.program)) {
-        Text options = {0};
+    build.built.program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
+                                                    &bytes, &binary_status, &status);
+    build.built.from_cache = true;
+    if (build_check(&build, "clCreateProgramWithBinary", status, build.built.program)) {
+        OwnedText options = {0};
         program_options_append(&options, compute->device, request->options);
         if (build_run(&build, compute->device, &options)) kernel_create(&build, request->kernel);
-        text_free(&options);
     }
     if (build.failed_call) build_release(&build);
     return build;
@@ -257,39 +246,35 @@ static Build build_from_binary(const Compute *compute, const Text *binary, const
 
 static Build build_from_cache(const Compute *compute, const ProgramRequest *request, const char *text)
 {
-    Build build = {0};
-    if (request->no_cache || !text) return build;
-    char *key = request_key(compute->device, request, text);
-    Text binary = {0};
-    if (cache_load(key, &binary, compute->device->warnings))
-        build = build_from_binary(compute, &binary, request);
-    text_free(&binary);
-    free(key);
-    return build;
+    if (request->no_cache || !text) return (Build){0};
+    OWNED char *key = request_key(compute->device, request, text);
+    OwnedText binary = {0};
+    if (!cache_load(key, &binary, compute->device->warnings)) return (Build){0};
+    return build_from_binary(compute, &binary, request);
 }
 
 // Loads the program of the first text or, if that one could not be built, of the second, out-of-line one,
 // which may be NULL. The build has no program if neither is in the cache.
-static Build load_any(const Compute *compute, const ProgramRequest *request, char *const texts[2],
-                      bool *is_out_of_line)
+static Build load_any(const Compute *compute, const ProgramRequest *request, char *const texts[2])
 {
     Build build = build_from_cache(compute, request, texts[0]);
-    *is_out_of_line = !build.program;
-    return build.program ? build : build_from_cache(compute, request, texts[1]);
+    if (build.built.program) return build;
+    build = build_from_cache(compute, request, texts[1]);
+    build.built.is_out_of_line = true;
+    return build;
 }
 
 // Builds the program of the first text or, if that fails, of the second. If both fail, returns the first
 // failure.
-static Build build_any(Compute *compute, const ProgramRequest *request, char *const texts[2],
-                       bool *is_out_of_line)
+static Build build_any(Compute *compute, const ProgramRequest *request, char *const texts[2])
 {
     Build build = build_with_retry(compute, texts[0], request);
-    *is_out_of_line = false;
     if (!build.failed_call || !texts[1]) return build;
     Build out_of_line = build_with_retry(compute, texts[1], request);
-    *is_out_of_line = !out_of_line.failed_call;
-    build_release(*is_out_of_line ? &build : &out_of_line);
-    return *is_out_of_line ? out_of_line : build;
+    const bool is_built = !out_of_line.failed_call;
+    build_release(is_built ? &build : &out_of_line);
+    out_of_line.built.is_out_of_line = true;
+    return is_built ? out_of_line : build;
 }
 
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program)
@@ -297,18 +282,15 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
     *program = (Program){0};
     if (!compute_ok(compute)) return false;
     const double start = clock_seconds();
-    char *const texts[] = {program_request_text(request, false),
-                           request->out_of_line_prelude ? program_request_text(request, true) : NULL};
-    Build build = load_any(compute, request, texts, &program->is_out_of_line);
-    program->from_cache = build.program != NULL;
-    if (!program->from_cache) build = build_any(compute, request, texts, &program->is_out_of_line);
-    const char *text = texts[program->is_out_of_line];
-    program->text_hash = hash_bytes(HASH_START, text, strlen(text));
-    if (build.failed_call) build_report(compute, &build, text, or_empty(request->options));
-    program->program = build.program;
-    program->kernel = build.kernel;
-    free(texts[0]);
-    free(texts[1]);
+    OWNED char *text = program_request_text(request, false),
+               *out_of_line = request->out_of_line_prelude ? program_request_text(request, true) : NULL;
+    char *const texts[] = {text, out_of_line};
+    Build build = load_any(compute, request, texts);
+    if (!build.built.program) build = build_any(compute, request, texts);
+    const char *used = texts[build.built.is_out_of_line];
+    if (build.failed_call) build_report(compute, &build, used, or_empty(request->options));
+    *program = build.built;
+    program->text_hash = hash_bytes(HASH_START, used, strlen(used));
     program->build_seconds = clock_seconds() - start;
     return compute_ok(compute);
 }
@@ -327,18 +309,11 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
     size_t size = 0;
     // a driver without a binary costs the next run a build; this one has its image
     if (!program_query(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size) || size == 0) return;
-    char *bytes = memory_allocate(size, 1);
-    if (!program_query(program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes)) {
-        free(bytes);
-        return;
-    }
-    char *text = program_request_text(request, program->is_out_of_line),
-         *key = request_key(compute->device, request, text);
-    Text binary = {.items = bytes, .count = size, .capacity = size};
+    OwnedText binary = {.items = memory_allocate(size, 1), .count = size, .capacity = size};
+    if (!program_query(program, CL_PROGRAM_BINARIES, sizeof binary.items, &binary.items)) return;
+    OWNED char *text = program_request_text(request, program->is_out_of_line),
+               *key = request_key(compute->device, request, text);
     cache_store(key, &binary, compute->device->warnings);
-    text_free(&binary);
-    free(key);
-    free(text);
 }
 
 void program_close(Program *program)
