@@ -49,12 +49,9 @@ char *file_stem(const char *path)
 int file_folder_open(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    char *folder = slash ? memory_copy_part(path, (size_t)(slash + 1 - path)) : memory_copy_text(".");
+    OWNED char *folder = slash ? memory_copy_part(path, (size_t)(slash + 1 - path)) : memory_copy_text(".");
     int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0 && errno == EACCES) descriptor = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
-    int error = errno;
-    free(folder);
-    errno = error;
     return descriptor;
 }
 

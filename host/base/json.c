@@ -27,7 +27,7 @@ static int json_output(const char *bytes, size_t length, void *text)
 // 17 digits or another fixed number of digits.
 static void json_quote(Json *json, const char *value)
 {
-    Text utf8 = {0};
+    OwnedText utf8 = {0};
     for (size_t left = strlen(value), size; left; value += size, left -= size) {
         size = text_character_size(value, left);
         text_append(&utf8, size ? value : "\xEF\xBF\xBD", size ? size : 3);
@@ -37,7 +37,6 @@ static void json_quote(Json *json, const char *value)
     if (!string || json_dump_callback(string, json_output, &json->text, JSON_ENCODE_ANY) != 0)
         fault("out of memory: JSON");
     json_decref(string);
-    text_free(&utf8);
 }
 
 static void json_line(Json *json)
@@ -216,14 +215,13 @@ Text json_close(Json *json)
 
 void json_print(Json *json, FILE *stream)
 {
-    Text text = json_close(json);
+    OwnedText text = json_close(json);
     fwrite(text.items, 1, text.count, stream);
-    text_free(&text);
 }
 
 void json_print_line(Json *json, FILE *stream)
 {
-    Text text = json_close(json);
+    OwnedText text = json_close(json);
     // jansson escapes line breaks in texts, so an indent follows each newline here
     for (const char *line = text_c(&text); *line; line += strspn(line, "\n ")) {
         const size_t length = strcspn(line, "\n");
@@ -232,5 +230,4 @@ void json_print_line(Json *json, FILE *stream)
     }
     fputc('\n', stream);
     fflush(stream);
-    text_free(&text);
 }

@@ -1,5 +1,6 @@
 #include "host/base/message.h"
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <ctype.h>
@@ -167,9 +168,8 @@ char *message_list_text(const MessageList *list)
 
 void message_list_print(const MessageList *list, FILE *stream)
 {
-    char *text = message_list_text(list);
+    OWNED char *text = message_list_text(list);
     if (text) fputs(text, stream);
-    free(text);
 }
 
 void message_list_free(MessageList *list)

@@ -86,13 +86,12 @@ bool output_is_temporary(const char *file_name, const char *name)
 void output_remove_stale(int folder, const char *file_name)
 {
     struct stat opened;
-    int descriptor = openat(folder, file_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    OwnedDescriptor descriptor = openat(folder, file_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) return;
     // its process may have removed or renamed it meanwhile, and another may use the name again
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &opened) == 0 &&
         S_ISREG(opened.st_mode) && opened.st_uid == geteuid() && file_has_name(descriptor, folder, file_name))
         unlinkat(folder, file_name, 0);
-    close(descriptor);
 }
 
 static void stale_temporaries_remove(const OutputFile *output)

@@ -10,7 +10,7 @@
 // floats are in their order, so histograms of the upper and then of the lower half of the bits find it.
 static float rank_select(const float *magnitudes, size_t count, size_t rank)
 {
-    size_t *counts = memory_allocate(1u << 16, sizeof *counts);
+    OWNED size_t *counts = memory_allocate(1u << 16, sizeof *counts);
     uint32_t found = 0;
     for (unsigned shift = 16;; shift = 0) {
         memset(counts, 0, (1u << 16) * sizeof *counts);
@@ -25,7 +25,6 @@ static float rank_select(const float *magnitudes, size_t count, size_t rank)
         found |= half << shift;
         if (shift == 0) break;
     }
-    free(counts);
     float value;
     memcpy(&value, &found, sizeof value);
     return value;

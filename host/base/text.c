@@ -22,10 +22,9 @@ void text_append(Text *text, const char *bytes, size_t length)
 
 void text_appendf(Text *text, const char *format, ...)
 {
-    char *formatted;
+    OWNED char *formatted = NULL;
     ARGUMENTS_FORMAT(formatted, format);
     text_append(text, formatted, strlen(formatted));
-    free(formatted);
 }
 
 char *text_format(const char *format, ...)
@@ -76,11 +75,10 @@ static ShortText short_format(const char *format, ...) __attribute__((format(pri
 // Formats a text, of which it keeps what fits.
 static ShortText short_format(const char *format, ...)
 {
-    char *formatted;
+    OWNED char *formatted = NULL;
     ARGUMENTS_FORMAT(formatted, format);
     ShortText text;
     snprintf(text.text, sizeof text.text, "%s", formatted);
-    free(formatted);
     return text;
 }
 
@@ -197,7 +195,7 @@ static size_t least(size_t a, size_t b)
 // searching, 2011, section 2.1).
 static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length)
 {
-    size_t *rows = memory_allocate(3 * (b_length + 1), sizeof *rows);
+    OWNED size_t *rows = memory_allocate(3 * (b_length + 1), sizeof *rows);
     size_t *before = rows, *last = before + b_length + 1, *row = last + b_length + 1;
     for (size_t j = 0; j <= b_length; j++)
         row[j] = j;
@@ -213,9 +211,7 @@ static size_t edit_distance(const char *a, size_t a_length, const char *b, size_
                 row[j] = least(row[j], before[j - 2] + 1);
         }
     }
-    size_t distance = row[b_length];
-    free(rows);
-    return distance;
+    return row[b_length];
 }
 
 const char *text_nearest(const char *word, const char *const *known, size_t known_count)

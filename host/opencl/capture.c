@@ -35,21 +35,18 @@ void capture_close(Compute *compute)
 
 // Writes a file named by the hash of its bytes, unless it exists, and adds its name to the JSON object.
 // On failure sets the Compute's failure and returns false.
-static bool file_write(Compute *compute, Json *json, const char *key, const char *ending, const void *bytes,
-                       size_t size)
+static bool capture_write(Compute *compute, Json *json, const char *key, const char *ending,
+                          const void *bytes, size_t size)
 {
-    char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
-         *path = text_format("%s/%s", compute->device->capture_folder, name);
-    MessageList messages = {0};
+    OWNED char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
+               *path = text_format("%s/%s", compute->device->capture_folder, name);
+    OwnedMessageList messages = {0};
     const bool is_written = access(path, F_OK) == 0 || output_write_file(path, bytes, size, &messages);
     if (!is_written && compute_ok(compute)) {
         compute_fail(compute, "capture", CL_SUCCESS, "%s", messages.items[0].text);
         compute->failure.is_of_host = true;
     }
-    message_list_free(&messages);
     if (json) json_text(json, key, name);
-    free(path);
-    free(name);
     return is_written;
 }
 
@@ -59,11 +56,9 @@ static bool buffer_write_file(Compute *compute, Json *json, cl_mem buffer)
     if (!buffer) json_none(json, "buffer");
     if (!buffer || !compute_try(compute, clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL)))
         return compute_ok(compute);
-    char *bytes = memory_allocate(size, 1);
-    const bool is_written =
-        buffer_read(compute, buffer, size, bytes) && file_write(compute, json, "buffer", "bin", bytes, size);
-    free(bytes);
-    return is_written;
+    OWNED char *bytes = memory_allocate(size, 1);
+    return buffer_read(compute, buffer, size, bytes) &&
+           capture_write(compute, json, "buffer", "bin", bytes, size);
 }
 
 static bool argument_write(Compute *compute, Json *json, const CapturedArgument *argument)
@@ -76,10 +71,9 @@ static bool argument_write(Compute *compute, Json *json, const CapturedArgument 
         memcpy(&buffer, text_c(&argument->value), sizeof buffer);
         is_written = buffer_write_file(compute, json, buffer);
     } else {
-        Text value = {0};
+        OwnedText value = {0};
         base64_append(&value, (const uint8_t *)argument->value.items, argument->value.count);
         json_text(json, "value", text_c(&value));
-        text_free(&value);
     }
     json_end(json);
     return is_written;
@@ -98,15 +92,15 @@ void capture_launch(Compute *compute, const Launch *launch)
 {
     if (!compute->device->capture_folder || !compute_ok(compute)) return;
     const ProgramRequest *request = launch->request;
-    char *text = program_request_text(request, launch->is_out_of_line);
-    Text options = {0};
+    OWNED char *text = program_request_text(request, launch->is_out_of_line);
+    OwnedText options = {0};
     program_options_append(&options, compute->device, request->options);
     Json *json = json_open();
     json_text(json, "device", compute->device->name);
     json_text(json, "driver", compute->device->driver);
     json_text(json, "kernel", request->kernel);
     json_text(json, "options", text_c(&options));
-    bool is_written = file_write(compute, json, "text", "cl", text, strlen(text));
+    bool is_written = capture_write(compute, json, "text", "cl", text, strlen(text));
     sizes_write(json, "first", launch->dimensions, launch->first);
     sizes_write(json, "items", launch->dimensions, launch->items);
     sizes_write(json, "group", launch->dimensions, launch->group);
@@ -121,9 +115,6 @@ void capture_launch(Compute *compute, const Launch *launch)
             compute->captured.items[i].index < argument_count)
             is_written = argument_write(compute, json, &compute->captured.items[i]);
     json_end(json);
-    Text index = json_close(json);
-    if (is_written) file_write(compute, NULL, NULL, "json", index.items, index.count);
-    text_free(&index);
-    text_free(&options);
-    free(text);
+    OwnedText index = json_close(json);
+    if (is_written) capture_write(compute, NULL, NULL, "json", index.items, index.count);
 }

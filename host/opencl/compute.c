@@ -64,10 +64,9 @@ bool compute_check_reference(Compute *compute)
 {
     const Compute *reference = compute->reference;
     if (!reference || compute_ok(reference) || !compute_ok(compute)) return compute_ok(compute);
-    char *text = compute_failure_text(reference);
+    OWNED char *text = compute_failure_text(reference);
     compute_fail(compute, reference->failure.call, reference->failure.status, "by its reference device: %s",
                  text);
-    free(text);
     return false;
 }
 

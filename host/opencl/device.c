@@ -176,9 +176,8 @@ static void texts_query(DeviceList *list, Device *device)
     device->version = device_text(list, id, CL_DEVICE_VERSION);
     device->driver = device_text(list, id, CL_DRIVER_VERSION);
     device->extensions = device_text(list, id, CL_DEVICE_EXTENSIONS);
-    char *profile = device_text(list, id, CL_DEVICE_PROFILE);
+    OWNED char *profile = device_text(list, id, CL_DEVICE_PROFILE);
     device->embedded_profile = strcmp(profile, "EMBEDDED_PROFILE") == 0;
-    free(profile);
 }
 
 static void limits_query(DeviceList *list, Device *device)
@@ -271,19 +270,17 @@ void device_list_open(DeviceList *list, WarningReceiver *warnings)
     if (!list_check(list, clGetPlatformIDs(0, NULL, &platform_count), "clGetPlatformIDs") ||
         platform_count == 0)
         return;
-    cl_platform_id *platforms = memory_allocate_zeroed(platform_count, sizeof *platforms);
+    OWNED cl_platform_id *platforms = memory_allocate_zeroed(platform_count, sizeof *platforms);
     if (list_check(list, clGetPlatformIDs(platform_count, platforms, NULL), "clGetPlatformIDs"))
         list->platform_count = platform_count;
 
     for (cl_uint i = 0; i < list->platform_count; i++) {
         cl_uint device_count;
-        cl_device_id *ids = platform_devices(list, platforms[i], &device_count);
+        OWNED cl_device_id *ids = platform_devices(list, platforms[i], &device_count);
         if (device_count == 0) list->empty_platform_count++;
         for (cl_uint j = 0; j < device_count; j++)
             device_list_add(list, platforms[i], ids[j], warnings);
-        free(ids);
     }
-    free(platforms);
 }
 
 void device_list_close(DeviceList *list)

@@ -93,8 +93,8 @@ static void advice_write(Text *text, const DeviceList *list)
 
 static void no_match_report(const DeviceList *list, const char *selector, MessageList *messages)
 {
-    char *failure = device_list_failure_text(list);
-    Text text = {0};
+    OWNED char *failure = device_list_failure_text(list);
+    OwnedText text = {0};
     if (list->count == 0)
         text_appendf(&text, "no OpenCL device on %u platform%s", list->platform_count,
                      text_plural(list->platform_count));
@@ -109,8 +109,6 @@ static void no_match_report(const DeviceList *list, const char *selector, Messag
     else
         advice_write(&text, list);
     message_error(messages, "%s", text_c(&text));
-    text_free(&text);
-    free(failure);
 }
 
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages)

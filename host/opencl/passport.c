@@ -52,35 +52,28 @@ enum { PASSPORT_FORMAT = 2 };
 
 static char *passport_key(const Device *device, PassportMode mode, uint32_t lanes)
 {
-    Text prelude = {0};
+    OwnedText prelude = {0};
     ProgramRequest request = passport_request(device, mode, lanes, true, false, &prelude);
-    char *launch = text_format("passport %d of %zu bytes", PASSPORT_FORMAT, sizeof(Passport));
+    OWNED char *launch = text_format("passport %d of %zu bytes", PASSPORT_FORMAT, sizeof(Passport));
     request.launch = launch;
-    char *key = program_key(device, &request);
-    free(launch);
-    text_free(&prelude);
-    return key;
+    return program_key(device, &request);
 }
 
 static bool passport_load(Passport *passport, const Device *device, PassportMode mode, uint32_t lanes)
 {
-    char *key = passport_key(device, mode, lanes);
-    Text bytes = {0};
+    OWNED char *key = passport_key(device, mode, lanes);
+    OwnedText bytes = {0};
     const bool is_loaded = cache_load(key, &bytes, device->warnings) && bytes.count == sizeof *passport;
     if (is_loaded) memcpy(passport, bytes.items, sizeof *passport);
-    text_free(&bytes);
-    free(key);
     return is_loaded;
 }
 
 static void passport_store(const Passport *passport, const Device *device)
 {
-    char *key = passport_key(device, passport->mode, passport->lanes);
-    Text bytes = {0};
+    OWNED char *key = passport_key(device, passport->mode, passport->lanes);
+    OwnedText bytes = {0};
     text_append(&bytes, (const char *)passport, sizeof *passport);
     cache_store(key, &bytes, device->warnings);
-    text_free(&bytes);
-    free(key);
 }
 
 // Returns the passport, or NULL if it is not known.

@@ -137,11 +137,10 @@ Finding passport_finding(const Passport *passport, Property property, Text *text
 bool passport_broken(const Passport *passport, Text *text)
 {
     for (Property property = 0; property < PROPERTY_COUNT; property++) {
-        Text what = {0};
-        const bool is_broken = passport_finding(passport, property, &what) == FINDING_BROKEN;
-        if (is_broken) text_appendf(text, "%s: %s", property_names[property], text_c(&what));
-        text_free(&what);
-        if (is_broken) return true;
+        OwnedText what = {0};
+        if (passport_finding(passport, property, &what) != FINDING_BROKEN) continue;
+        text_appendf(text, "%s: %s", property_names[property], text_c(&what));
+        return true;
     }
     return false;
 }
@@ -152,12 +151,11 @@ bool passports_abnormal(const Device *device, Text *text)
     for (size_t i = 0; i < passport_count(device); i++) {
         const Passport *passport = passport_at(device, i);
         for (Property property = 0; property < PROPERTY_COUNT; property++) {
-            Text what = {0};
+            OwnedText what = {0};
             if (passport_finding(passport, property, &what) != FINDING_SOUND)
                 text_appendf(text, "%s%s, %u lane%s: %s: %s", text->count > before ? "\n" : "",
                              passport_mode_names[passport->mode], passport->lanes,
                              text_plural(passport->lanes), property_names[property], text_c(&what));
-            text_free(&what);
         }
     }
     return text->count > before;

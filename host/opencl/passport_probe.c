@@ -52,14 +52,13 @@ LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, 
 void operands_write(Measurement *measurement, const Operands *operands, size_t count)
 {
     const size_t size = scalar_size(measurement);
-    char *bytes = memory_allocate(3 * count, size);
+    OWNED char *bytes = memory_allocate(3 * count, size);
     for (size_t i = 0; i < count; i++) {
         const uint64_t bits[] = {operands[i].a, operands[i].b, operands[i].c};
         for (size_t k = 0; k < 3; k++) // the low bytes come first
             memcpy(bytes + (k * count + i) * size, &bits[k], size);
     }
     buffer_write(measurement->compute, measurement->operands, 3 * count * size, bytes);
-    free(bytes);
 }
 
 void probe_kernel_open(Measurement *measurement, bool has_fma)
@@ -85,14 +84,13 @@ bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands
     memcpy(filled, operands, count * sizeof *operands);
     operands_write(measurement, filled, padded);
     probe_launch(measurement, probe, 0, 0, (cl_uint)padded, (cl_uint)padded);
-    char *bytes = memory_allocate(2 * padded, size);
+    OWNED char *bytes = memory_allocate(2 * padded, size);
     const bool is_read = buffer_read(measurement->compute, measurement->results, 2 * padded * size, bytes);
     memset(results, 0, count * sizeof *results);
     for (size_t i = 0; i < count && is_read; i++) {
         memcpy(&results[i].first, bytes + i * size, size);
         memcpy(&results[i].second, bytes + (padded + i) * size, size);
     }
-    free(bytes);
     return is_read;
 }
 

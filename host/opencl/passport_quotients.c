@@ -85,7 +85,7 @@ static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint
     Compute *compute = measurement->compute;
     const Operands operands = operands_of(measurement, (Reals){operand, 0, 0});
     operands_write(measurement, &operands, 1);
-    char *bytes = memory_allocate(2 * (size_t)RESULTS_MAX, size);
+    OWNED char *bytes = memory_allocate(2 * (size_t)RESULTS_MAX, size);
     Sweep sweep = {.measurement = measurement, .results = results, .probe = probe, .operand = operand};
     pthread_mutex_init(&sweep.mutex, NULL);
     uint32_t done = 0;
@@ -106,7 +106,6 @@ static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint
         if (part < RESULTS_MAX && last_seconds < 0.01) part *= 2;
     }
     pthread_mutex_destroy(&sweep.mutex);
-    free(bytes);
     return done == count;
 }
 

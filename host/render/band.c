@@ -113,9 +113,8 @@ void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags
 
 static void buffer_clear(Pass *pass, cl_mem buffer, size_t size)
 {
-    void *zeros = memory_allocate_zeroed(size, 1);
+    OWNED void *zeros = memory_allocate_zeroed(size, 1);
     buffer_write(pass->compute, buffer, size, zeros);
-    free(zeros);
 }
 
 // Clears the bits of uncertain pixels, which kernels only set.

@@ -152,7 +152,7 @@ static bool rows_mark(bool *is_saved, const Film *band)
 static const char *records_find(Checkpoint *checkpoint, MessageList *messages)
 {
     struct stat status;
-    bool *is_saved = memory_allocate_zeroed(checkpoint->film.row_count, sizeof *is_saved);
+    OWNED bool *is_saved = memory_allocate_zeroed(checkpoint->film.row_count, sizeof *is_saved);
     Film band;
     RecordState state;
     while ((state = record_read(checkpoint, checkpoint->end, &band)) == RECORD_WHOLE &&
@@ -161,7 +161,6 @@ static const char *records_find(Checkpoint *checkpoint, MessageList *messages)
         film_free(&band);
     }
     film_free(&band);
-    free(is_saved);
     if (state == RECORD_FAILED || fstat(checkpoint->descriptor, &status) != 0) return "read";
     if (status.st_size == checkpoint->end) return NULL;
     if (ftruncate(checkpoint->descriptor, checkpoint->end) != 0) return "write";
@@ -196,7 +195,7 @@ static void difference_report(const char *path, const char *key, const char *fou
 {
     bool differs = false;
     for (const char *line = key; *line && !differs; line += strcspn(line, "\n") + 1) {
-        char *expected = key_value(key, line), *stored = key_value(found, line);
+        OWNED char *expected = key_value(key, line), *stored = key_value(found, line);
         differs = strcmp(expected, stored) != 0;
         if (differs)
             message_error(
@@ -204,8 +203,6 @@ static void difference_report(const char *path, const char *key, const char *fou
                 "the checkpoint '%s' belongs to another image (%.*s: %s, not %s); remove it or name "
                 "another file",
                 path, (int)strcspn(line, ":"), line, stored, expected);
-        free(expected);
-        free(stored);
     }
     if (!differs) damage_report(path, messages); // the key in the file has further lines
 }
@@ -234,14 +231,13 @@ static void refusal_report(const char *path, const char *key, const char *found,
     FileHeader header;
     memcpy(&header, found, sizeof header);
     const char *found_key = found + sizeof header;
-    Text head = head_of(found_key);
+    OwnedText head = head_of(found_key);
     if (memcmp(header.magic, file_magic, sizeof header.magic) != 0 || header.format != file_format)
         message_error(messages, "'%s' is not a checkpoint of this version of glint", path);
     else if (memcmp(found, head.items, head.count) != 0)
         damage_report(path, messages);
     else
         difference_report(path, key, found_key, messages);
-    text_free(&head);
 }
 
 // Checks the bytes with which the file begins. Writes those of a new file, or of a file whose process ended
@@ -254,8 +250,8 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
     const size_t size = !S_ISREG(status.st_mode)     ? 0
                         : status.st_size < FOUND_MAX ? (size_t)status.st_size
                                                      : FOUND_MAX;
-    Text head = head_of(key);
-    char *found = memory_allocate_zeroed(FOUND_MAX + 1, 1);
+    OwnedText head = head_of(key);
+    OWNED char *found = memory_allocate_zeroed(FOUND_MAX + 1, 1);
     bool is_right = bytes_read(checkpoint->descriptor, found, size, 0);
     if (!is_right) {
         open_failed(checkpoint->path, "read", messages);
@@ -270,8 +266,6 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
         if (!is_right) open_failed(checkpoint->path, "write", messages);
     }
     checkpoint->end = (off_t)head.count;
-    free(found);
-    text_free(&head);
     return is_right;
 }
 
@@ -279,10 +273,8 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
 // folder.
 static void folder_sync(const Checkpoint *checkpoint)
 {
-    int folder = file_folder_open(checkpoint->file_path);
-    if (folder < 0) return;
-    file_sync(folder);
-    close(folder);
+    OwnedDescriptor folder = file_folder_open(checkpoint->file_path);
+    if (folder >= 0) file_sync(folder);
 }
 
 // Opens and locks the file. Between the two, another process that completed its image may remove the file.

@@ -116,11 +116,10 @@ static void sample_offsets_upload(Pass *pass)
 {
     const uint32_t count = pass->settings.sample_count;
     const size_t size = 2 * count * pass_scalar_size(pass);
-    void *offsets = sample_pattern(count, pass->scene.is_double);
+    OWNED void *offsets = sample_pattern(count, pass->scene.is_double);
     if (pass->scene.hashes) pass->scene.hash = hash_bytes(pass->scene.hash, offsets, size);
     buffer_release(pass->sample_offsets);
     pass->sample_offsets = buffer_create(pass->compute, size, offsets, CL_MEM_READ_ONLY);
-    free(offsets);
 }
 
 enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
@@ -160,14 +159,13 @@ static void scene_changed(Pass *pass)
 
 void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *compiled)
 {
-    DeviceScene **scenes = memory_allocate(count, sizeof *scenes);
+    OWNED DeviceScene **scenes = memory_allocate(count, sizeof *scenes);
     for (size_t i = 0; i < count; i++)
         scenes[i] = &passes[i]->scene;
     stage_begin(passes[0]->settings.stage, "uploading the scene", NULL, 0);
     device_scenes_upload(scenes, count, compiled);
     for (size_t i = 0; i < count; i++)
         scene_changed(passes[i]);
-    free(scenes);
 }
 
 bool pass_compile(Pass *pass, const Scene *scene, const RenderSettings *settings, CompiledScene *fresh,

@@ -41,16 +41,14 @@ static bool variant_is_needed(SceneVariant variant, const RendererSet *set, cons
 static bool variants_compile(const RendererSet *set, const Scene *scene, const RenderSettings *settings,
                              const RemoteWorkers *remote, MessageList *messages)
 {
-    Pass **receivers = memory_allocate(set->count, sizeof *receivers);
-    bool compiles = true;
-    for (PixelPass pass = PASS_ALL; pass < PASS_COUNT && compiles; pass++)
-        for (uint32_t lanes = 1; lanes <= LANES_MAX && compiles; lanes *= 2) {
+    OWNED Pass **receivers = memory_allocate(set->count, sizeof *receivers);
+    for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
+        for (uint32_t lanes = 1; lanes <= LANES_MAX; lanes *= 2) {
             const SceneVariant variant = {pass, lanes};
             if (!variant_is_needed(variant, set, remote)) continue;
             const CompileSettings compiling = settings_of_variant(settings, variant);
             CompiledScene compiled;
-            compiles = scene_compile(&compiled, scene, &compiling, messages);
-            if (!compiles) break;
+            if (!scene_compile(&compiled, scene, &compiling, messages)) return false;
             if (remote) remote->send_scene(remote->context, variant, &compiled);
             const size_t count = receivers_find(receivers, set, variant, &compiled);
             if (count > 0)
@@ -58,8 +56,7 @@ static bool variants_compile(const RendererSet *set, const Scene *scene, const R
             else
                 compiled_scene_free(&compiled);
         }
-    free(receivers);
-    return compiles;
+    return true;
 }
 
 bool renderers_open(const RendererSet *set, const Scene *scene, const RenderSettings *settings,
@@ -153,7 +150,7 @@ bool render_job_run(const RenderJob *job)
                                         .context = job->context,
                                         .checkpoint = job->checkpoint};
     Scheduler *scheduler = scheduler_open(&settings);
-    DeviceWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
+    OWNED DeviceWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
     const size_t first_thread = remote ? 0 : 1; // one works in the caller's thread
     for (size_t i = 0; i < count; i++)
         workers[i] = (DeviceWorker){
@@ -166,15 +163,13 @@ bool render_job_run(const RenderJob *job)
         worker_run(&workers[0]);
     for (size_t i = first_thread; i < count; i++)
         if (workers[i].has_thread) pthread_join(workers[i].thread, NULL);
-    free(workers);
-    WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
-    bool whole = scheduler_close(scheduler, shares);
+    OWNED WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
+    const bool whole = scheduler_close(scheduler, shares);
     // the parts of an image add up, whose first sample is 0 only in the first
     const bool is_part = job->renderers[0]->passes[PASS_ALL].settings.first_sample > 0;
     for (size_t i = 0; i < count; i++)
         share_set(&job->renderers[i]->report.share, &shares[i], is_part);
     for (size_t i = 0; i < remote_count; i++)
         share_set(&remote->shares[i], &shares[count + i], is_part);
-    free(shares);
     return whole;
 }

@@ -57,7 +57,7 @@ static void layer_merge(const RerenderedBand *band, Layer layer, const PixelList
     const size_t components = film_components(&band->film, layer);
     const double unit = layer_types[layer] == LAYER_TYPE_LENGTH ? band->pass->scene.compiled.unit : 1;
     void *values = band_map(band->pass, band->buffers, layer, CL_MAP_READ | CL_MAP_WRITE);
-    void *rerendered = memory_allocate(list_buffers->layer_sizes[layer], 1);
+    OWNED void *rerendered = memory_allocate(list_buffers->layer_sizes[layer], 1);
     const bool is_read = pass_read(other, list_buffers->film, list_buffers->layer_begins[layer],
                                    list_buffers->layer_sizes[layer], rerendered);
     for (size_t i = 0; i < list->count && values && is_read; i++)
@@ -68,7 +68,6 @@ static void layer_merge(const RerenderedBand *band, Layer layer, const PixelList
             else
                 ((float *)values)[to] = (float)(((const double *)rerendered)[from] / unit);
         }
-    free(rerendered);
     compute_unmap(band->pass->compute, band->buffers->film, values);
 }
 
@@ -104,16 +103,15 @@ static void list_write(Pass *pass, cl_mem flags, const PixelList *list)
 {
     const size_t size = list->count * sizeof *list->items,
                  count_size = pass->settings.first_sample > 0 ? list->count * sizeof(uint32_t) : 0;
-    char *bytes = memory_allocate_zeroed(size + count_size, 1);
+    OWNED char *bytes = memory_allocate_zeroed(size + count_size, 1);
     memcpy(bytes, list->items, size);
     buffer_write(pass->compute, flags, size + count_size, bytes);
-    free(bytes);
 }
 
 // Keeps the pixels of a rendered list that the pass flags. Adds their uncertain samples to the count.
 static bool list_keep_flagged(Pass *pass, const BandBuffers *buffers, PixelList *list, uint64_t *sample_count)
 {
-    uint32_t *uncertain = memory_allocate(list->count, sizeof *uncertain);
+    OWNED uint32_t *uncertain = memory_allocate(list->count, sizeof *uncertain);
     const bool is_read = pass_read(pass, buffers->flags, list->count * sizeof *list->items,
                                    list->count * sizeof *uncertain, uncertain);
     size_t kept = 0;
@@ -122,7 +120,6 @@ static bool list_keep_flagged(Pass *pass, const BandBuffers *buffers, PixelList 
         if (uncertain[i] > 0) list->items[kept++] = list->items[i];
     }
     list->count = kept;
-    free(uncertain);
     return is_read;
 }
 
@@ -161,12 +158,11 @@ bool band_rerender(Pass *pass, KernelType type, unsigned layers, BandBuffers *bu
                                  aovs, buffers, film_of_rows(pass, rows.first_row, rows.row_count)};
     const LaunchRange range = launch_range_of_rows(pass, rows);
     const size_t word_count = launch_range_flag_words(&range);
-    uint32_t *words = memory_allocate(word_count, sizeof *words);
+    OWNED uint32_t *words = memory_allocate(word_count, sizeof *words);
     bool is_whole = pass_read(pass, type == KERNEL_RENDER ? buffers->flags : buffers->center_flags, 0,
                               word_count * sizeof *words, words);
     PixelList list = {0};
     if (is_whole) list = flagged_list(pass, rows, words, word_count);
-    free(words);
     const bool has_samples = type != KERNEL_AOV && type != KERNEL_PATH;
     const uint32_t samples = has_samples ? samples_rendered(&pass->settings) : 1;
     buffers->rerenders.rerendered += (uint64_t)list.count * samples;

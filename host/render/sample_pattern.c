@@ -13,7 +13,7 @@
 void *sample_pattern(uint32_t count, bool is_double)
 {
     const double steps[2] = {0.7548776662466927, 0.5698402909980532};
-    double *offsets = memory_allocate(2 * (size_t)count, sizeof *offsets);
+    OWNED double *offsets = memory_allocate(2 * (size_t)count, sizeof *offsets);
     for (int axis = 0; axis < 2; axis++) {
         double mean = 0;
         for (uint32_t i = 0; i < count; i++) {
@@ -26,9 +26,8 @@ void *sample_pattern(uint32_t count, bool is_double)
             *offset = fmin(fmax(*offset - mean, -1), 1);
         }
     }
-    if (is_double) return offsets;
+    if (is_double) return memory_release(&offsets);
     float *narrow = memory_allocate(2 * (size_t)count, sizeof *narrow);
     numbers_narrow(narrow, offsets, 2 * (size_t)count);
-    free(offsets);
     return narrow;
 }

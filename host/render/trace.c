@@ -182,15 +182,13 @@ static bool passes_trace(Pass *pass, KernelType type, const TraceRay *rays, size
     for (size_t i = 0; i < ray_count; i++)
         count += hits[i].certainty == TRACE_UNCERTAIN;
     if (count == 0) return true;
-    TraceRay *chosen = memory_allocate(count, sizeof *chosen);
-    TraceHit *found = memory_allocate(count, sizeof *found);
+    OWNED TraceRay *chosen = memory_allocate(count, sizeof *chosen);
+    OWNED TraceHit *found = memory_allocate(count, sizeof *found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) chosen[k++] = rays[i];
     const bool is_done = passes_trace(pass_next(pass), type, chosen, count, found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) hits[i] = found[k++];
-    free(chosen);
-    free(found);
     return is_done;
 }
 
