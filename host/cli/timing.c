@@ -132,8 +132,8 @@ static void text_print(const ImageOrigin *origin, const HostTimes *host)
     if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < origin->renderer_count; i++) {
         const RenderReport *report = renderer_report(origin->renderers[i]);
-        fprintf(stderr, "%s, %u lane%s (kernel %016llx)\n", report->device->name, report->lanes,
-                text_plural(report->lanes), (unsigned long long)report->kernel_hash);
+        fprintf(stderr, "%s, %u lane%s (kernel %016" PRIx64 ")\n", report->device->name, report->lanes,
+                text_plural(report->lanes), report->kernel_hash);
         passports_remark(report->device, stderr);
         if (origin->renderer_count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
