@@ -96,11 +96,9 @@ Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsign
 Film film_copy(const Film *band)
 {
     Film copy = *band;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        if (!band->layers[layer]) continue;
-        size_t size = film_layer_size(band, layer);
-        copy.layers[layer] = memcpy(memory_allocate(size, 1), band->layers[layer], size);
-    }
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer])
+            copy.layers[layer] = memory_copy(band->layers[layer], film_layer_size(band, layer), 1);
     return copy;
 }
 
