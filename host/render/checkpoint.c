@@ -67,28 +67,30 @@ struct Checkpoint {
     ARRAY_OF(off_t) offsets; // in the order of `bands`
 };
 
-// Reads bytes at an offset. Returns false at the end of the file, or if it cannot be read.
-static bool bytes_read(int descriptor, void *bytes, size_t size, off_t offset)
+// Reads bytes at an offset, which advances. Returns false at the end of the file, or if it cannot be read.
+static bool bytes_read(int descriptor, void *bytes, size_t size, off_t *offset)
 {
     for (size_t done = 0; done < size;) {
-        ssize_t count = pread(descriptor, (char *)bytes + done, size - done, offset + (off_t)done);
+        ssize_t count = pread(descriptor, (char *)bytes + done, size - done, *offset);
         if (count < 0 && errno == EINTR) continue;
         if (count <= 0) {
             if (count == 0) errno = EIO;
             return false;
         }
         done += (size_t)count;
+        *offset += count;
     }
     return true;
 }
 
-static bool bytes_write(int descriptor, const void *bytes, size_t size, off_t offset)
+static bool bytes_write(int descriptor, const void *bytes, size_t size, off_t *offset)
 {
     for (size_t done = 0; done < size;) {
-        ssize_t count = pwrite(descriptor, (const char *)bytes + done, size - done, offset + (off_t)done);
+        ssize_t count = pwrite(descriptor, (const char *)bytes + done, size - done, *offset);
         if (count < 0 && errno == EINTR) continue;
         if (count < 0) return false;
         done += (size_t)count;
+        *offset += count;
     }
     return true;
 }
@@ -115,19 +117,16 @@ static RecordState record_read(const Checkpoint *checkpoint, off_t offset, Film 
     *band = (Film){0};
     if (fstat(checkpoint->descriptor, &status) != 0) return RECORD_FAILED;
     if (status.st_size - offset < (off_t)sizeof record) return RECORD_TORN;
-    if (!bytes_read(checkpoint->descriptor, &record, sizeof record, offset)) return RECORD_FAILED;
-    offset += (off_t)sizeof record;
+    if (!bytes_read(checkpoint->descriptor, &record, sizeof record, &offset)) return RECORD_FAILED;
     // the header decides how much memory the band takes
     if (!film_header_fits(&record.film, &checkpoint->film) ||
         film_header_size(&record.film) > (uint64_t)(status.st_size - offset))
         return RECORD_TORN;
     *band = film_of_header(&record.film);
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        if (!band->layers[layer]) continue;
-        const size_t size = film_layer_size(band, layer);
-        if (!bytes_read(checkpoint->descriptor, band->layers[layer], size, offset)) return RECORD_FAILED;
-        offset += (off_t)size;
-    }
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer] &&
+            !bytes_read(checkpoint->descriptor, band->layers[layer], film_layer_size(band, layer), &offset))
+            return RECORD_FAILED;
     const RecordHeader expected = record_of(band);
     return memcmp(&record, &expected, sizeof record) == 0 ? RECORD_WHOLE : RECORD_TORN;
 }
@@ -252,7 +251,7 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
                                                      : FOUND_MAX;
     OwnedText head = head_of(key);
     OWNED char *found = memory_allocate_zeroed(FOUND_MAX + 1, 1);
-    bool is_right = bytes_read(checkpoint->descriptor, found, size, 0);
+    bool is_right = bytes_read(checkpoint->descriptor, found, size, &(off_t){0});
     if (!is_right) {
         open_failed(checkpoint->path, "read", messages);
     } else if (!S_ISREG(status.st_mode) ||
@@ -261,7 +260,7 @@ static bool head_check(Checkpoint *checkpoint, const char *key, MessageList *mes
         is_right = false;
     } else if (status.st_size < (off_t)head.count) {
         is_right = ftruncate(checkpoint->descriptor, 0) == 0 &&
-                   bytes_write(checkpoint->descriptor, head.items, head.count, 0) &&
+                   bytes_write(checkpoint->descriptor, head.items, head.count, &(off_t){0}) &&
                    file_sync(checkpoint->descriptor);
         if (!is_right) open_failed(checkpoint->path, "write", messages);
     }
@@ -329,14 +328,11 @@ static bool checkpoint_failed(Checkpoint *checkpoint, const char *doing)
 static bool record_write(Checkpoint *checkpoint, const RecordHeader *record, const Film *band)
 {
     off_t offset = checkpoint->end;
-    if (!bytes_write(checkpoint->descriptor, record, sizeof *record, offset)) return false;
-    offset += (off_t)sizeof *record;
-    for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
-        if (!band->layers[layer]) continue;
-        size_t size = film_layer_size(band, layer);
-        if (!bytes_write(checkpoint->descriptor, band->layers[layer], size, offset)) return false;
-        offset += (off_t)size;
-    }
+    if (!bytes_write(checkpoint->descriptor, record, sizeof *record, &offset)) return false;
+    for (Layer layer = 0; layer < LAYER_COUNT; layer++)
+        if (band->layers[layer] &&
+            !bytes_write(checkpoint->descriptor, band->layers[layer], film_layer_size(band, layer), &offset))
+            return false;
     double now = clock_seconds();
     if (now - checkpoint->synced_seconds < sync_seconds) return true;
     checkpoint->synced_seconds = now;
