@@ -11,6 +11,7 @@
 #define TYPES_H
 
 #ifndef __OPENCL_VERSION__
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct {
@@ -232,6 +233,12 @@ static inline unsigned leaf_count(unsigned child_type)
     return child_type >> 8;
 }
 
+// Returns whether kernels with several lanes read the leaves of a type as blocks.
+static inline bool type_has_blocks(unsigned type)
+{
+    return type == TYPE_TRIANGLES || type == TYPE_SPHERES;
+}
+
 // The vertices of a leaf's triangles, for kernels with several lanes, which test one triangle per lane
 // (kernels/traversal/triangle_block.h). The rows a.x, a.y, a.z, b.x ... c.z are as wide as a node. If a leaf
 // has fewer triangles, the first one is repeated.
@@ -328,7 +335,7 @@ typedef struct {
     // bits of the least alpha that stops them, as a float; z, w: WRAP_… along u and v
     uint4 cutout;
     uint4 normal_map; // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_…
-} Material;
+} FlatMaterial;
 
 // Modes in which a texture extends beyond its edges.
 enum { WRAP_REPEATED, WRAP_CLAMPED, WRAP_MIRRORED };
@@ -406,11 +413,12 @@ enum {
     LIGHT_AREA_SKY
 };
 
-// One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's image.
+// One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's
+// image.
 typedef struct {
     // x: least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
     scalar4 range;
-} SkyCell;
+} FlatSkyCell;
 
 enum { SKY_ROWS = 128, SKY_COLUMNS = 128 };
 
@@ -429,7 +437,7 @@ typedef struct {
     // turns the product of a cell's color and both its ranges into a fraction of `color`.
     scalar4 across_u, across_v;
     uint4 type; // x: LIGHT_TYPE_…, y: LIGHT_AREA_…
-} Light;
+} FlatLight;
 
 enum { CAMERA_ORTHOGRAPHIC = 1, CAMERA_EQUIRECTANGULAR };
 
@@ -485,9 +493,9 @@ typedef struct {
     ARRAY(SPHERE_BLOCKS, SphereBlock, , sphere_blocks)                 \
     ARRAY(CULL_SPHERES, CullSphere, , cull_spheres)                    \
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \
-    ARRAY(MATERIALS, Material, , materials)                            \
-    ARRAY(LIGHTS, Light, , lights)                                     \
-    ARRAY(SKY_CELLS, SkyCell, , sky_cells)                             \
+    ARRAY(MATERIALS, FlatMaterial, , materials)                        \
+    ARRAY(LIGHTS, FlatLight, , lights)                                 \
+    ARRAY(SKY_CELLS, FlatSkyCell, , sky_cells)                         \
     ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)              \
     ARRAY(SHARED_MESHES, SharedMesh, , shared_meshes)                  \
     ARRAY(INSTANCE_IDS, InstanceIds, , instance_ids)

@@ -9,109 +9,109 @@
 typedef struct {
     scalar4 planes[BVH_PLANES];
     uint4 child_index[1], child_type[1];
-} HostBvhNode;
+} BvhNode;
 
 typedef struct {
     scalar4 rows[BLOCK_ROWS];
-} HostTriangleBlock;
+} TriangleBlock;
 
 typedef struct {
     scalar4 rows[SPHERE_ROWS];
     uint4 ids[1], indices[1];
-} HostSphereBlock;
+} SphereBlock;
 
-// Every member of every struct: its type in the flat arrays, the kernels' name of the struct, the host's, the
-// member. REALS are scalar4, INTEGERS uint4. In a shape only the last member, its id, is listed.
+// Every member of every struct: its type in the flat arrays, the struct, the member. REALS are scalar4,
+// INTEGERS uint4. In a shape only the last member, its id, is listed.
 // clang-format off
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, ambient)                        \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_up)                         \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_above)                      \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_below)                      \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_forward)                    \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_right)                      \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, eye)                            \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_right)                     \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_up)                        \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds)                         \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_low)                     \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds_high)                    \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_low)                    \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, contact_high)                    \
-    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sample)                         \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, image)                       \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, sky_texture)                 \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[TYPE_QUARTETS - 1])   \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[TYPE_QUARTETS - 1]) \
-    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, Superellipsoid, rows[2]) \
-    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, Superellipsoid, extent)  \
-    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, inverses[2])                \
-    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, sizes)                      \
-    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
-    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
-    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
-    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, a_b)                      \
-    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, TriangleUvs, c_density)                \
-    INTEGERS(FLAT_TRIANGLE_NEIGHBORS, TriangleNeighbors, TriangleNeighbors, ids_sides) \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[0])                           \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[1])                           \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[2])                           \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[3])                           \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[4])                           \
-    REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_index[0])                   \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_type[0])                    \
-    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[0])       \
-    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[BLOCK_ROWS - 1]) \
-    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[0])             \
-    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[SPHERE_ROWS - 1]) \
-    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, ids[0])           \
-    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, indices[0])       \
-    INTEGERS(FLAT_BLOCK_TRIANGLES, BlockTriangles, BlockTriangles, triangles)    \
-    REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
-    INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, type_index_material)        \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_tint)               \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, specular_tint)                 \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, transmission_tint)             \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, emission)                      \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, absorption)                    \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_real)                \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_imaginary_squared)   \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, normal_u)                      \
-    REALS(FLAT_MATERIALS, Material, FlatMaterial, normal_v)                      \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_green)        \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_blue)         \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, cutout)                       \
-    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, normal_map)                   \
-    REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
-    REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
-    REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
-    REALS(FLAT_LIGHTS, Light, FlatLight, cone)                                   \
-    REALS(FLAT_LIGHTS, Light, FlatLight, fading)                                 \
-    REALS(FLAT_LIGHTS, Light, FlatLight, across_u)                               \
-    REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
-    INTEGERS(FLAT_LIGHTS, Light, FlatLight, type)                                \
-    REALS(FLAT_SKY_CELLS, SkyCell, FlatSkyCell, range)                           \
-    INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, range)             \
-    INTEGERS(FLAT_TEXELS, Texel, Texel, color)                                   \
-    REALS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, extent)                    \
-    INTEGERS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, root_entry)             \
-    INTEGERS(FLAT_INSTANCE_IDS, InstanceIds, InstanceIds, ids)
+    REALS(FLAT_HEADER, SceneHeader, background)                                  \
+    REALS(FLAT_HEADER, SceneHeader, ambient)                                     \
+    REALS(FLAT_HEADER, SceneHeader, sky_up)                                      \
+    REALS(FLAT_HEADER, SceneHeader, sky_above)                                   \
+    REALS(FLAT_HEADER, SceneHeader, sky_below)                                   \
+    REALS(FLAT_HEADER, SceneHeader, sky_forward)                                 \
+    REALS(FLAT_HEADER, SceneHeader, sky_right)                                   \
+    REALS(FLAT_HEADER, SceneHeader, eye)                                         \
+    REALS(FLAT_HEADER, SceneHeader, forward)                                     \
+    REALS(FLAT_HEADER, SceneHeader, lens_right)                                  \
+    REALS(FLAT_HEADER, SceneHeader, lens_up)                                     \
+    REALS(FLAT_HEADER, SceneHeader, right)                                       \
+    REALS(FLAT_HEADER, SceneHeader, up)                                          \
+    REALS(FLAT_HEADER, SceneHeader, bounds)                                      \
+    REALS(FLAT_HEADER, SceneHeader, bounds_low)                                  \
+    REALS(FLAT_HEADER, SceneHeader, bounds_high)                                 \
+    REALS(FLAT_HEADER, SceneHeader, contact_low)                                 \
+    REALS(FLAT_HEADER, SceneHeader, contact_high)                                \
+    REALS(FLAT_HEADER, SceneHeader, sample)                                      \
+    INTEGERS(FLAT_HEADER, SceneHeader, image)                                    \
+    INTEGERS(FLAT_HEADER, SceneHeader, bounces)                                  \
+    INTEGERS(FLAT_HEADER, SceneHeader, cull_spheres)                             \
+    INTEGERS(FLAT_HEADER, SceneHeader, sky_texture)                              \
+    INTEGERS(FLAT_HEADER, SceneHeader, counts[0])                                \
+    INTEGERS(FLAT_HEADER, SceneHeader, counts[TYPE_QUARTETS - 1])                \
+    INTEGERS(FLAT_HEADER, SceneHeader, bvh_counts[0])                            \
+    INTEGERS(FLAT_HEADER, SceneHeader, bvh_counts[TYPE_QUARTETS - 1])            \
+    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, rows[2])      \
+    REALS(FLAT_FIRST_SHAPE + TYPE_SUPERELLIPSOIDS, Superellipsoid, extent)       \
+    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, inverses[2])                      \
+    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, sizes)                            \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, a)                             \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, b)                             \
+    REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, c)                             \
+    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, a_b)                                   \
+    REALS(FLAT_TRIANGLE_UVS, TriangleUvs, c_density)                             \
+    INTEGERS(FLAT_TRIANGLE_NEIGHBORS, TriangleNeighbors, ids_sides)              \
+    REALS(FLAT_NODES, BvhNode, planes[0])                                        \
+    REALS(FLAT_NODES, BvhNode, planes[1])                                        \
+    REALS(FLAT_NODES, BvhNode, planes[2])                                        \
+    REALS(FLAT_NODES, BvhNode, planes[3])                                        \
+    REALS(FLAT_NODES, BvhNode, planes[4])                                        \
+    REALS(FLAT_NODES, BvhNode, planes[5])                                        \
+    INTEGERS(FLAT_NODES, BvhNode, child_index[0])                                \
+    INTEGERS(FLAT_NODES, BvhNode, child_type[0])                                 \
+    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, rows[0])                          \
+    REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, rows[BLOCK_ROWS - 1])             \
+    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, rows[0])                              \
+    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, rows[SPHERE_ROWS - 1])                \
+    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, ids[0])                            \
+    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, indices[0])                        \
+    INTEGERS(FLAT_BLOCK_TRIANGLES, BlockTriangles, triangles)                    \
+    REALS(FLAT_CULL_SPHERES, CullSphere, center_power)                           \
+    INTEGERS(FLAT_OBJECTS, ObjectEntry, type_index_material)                     \
+    REALS(FLAT_MATERIALS, FlatMaterial, color)                                   \
+    REALS(FLAT_MATERIALS, FlatMaterial, diffuse)                                 \
+    REALS(FLAT_MATERIALS, FlatMaterial, other_color)                             \
+    REALS(FLAT_MATERIALS, FlatMaterial, grid)                                    \
+    REALS(FLAT_MATERIALS, FlatMaterial, reflection_transmission_ior)             \
+    REALS(FLAT_MATERIALS, FlatMaterial, reflection_tint)                         \
+    REALS(FLAT_MATERIALS, FlatMaterial, specular_tint)                           \
+    REALS(FLAT_MATERIALS, FlatMaterial, transmission_tint)                       \
+    REALS(FLAT_MATERIALS, FlatMaterial, emission)                                \
+    REALS(FLAT_MATERIALS, FlatMaterial, absorption)                              \
+    REALS(FLAT_MATERIALS, FlatMaterial, conductor_real)                          \
+    REALS(FLAT_MATERIALS, FlatMaterial, conductor_imaginary_squared)             \
+    REALS(FLAT_MATERIALS, FlatMaterial, normal_u)                                \
+    REALS(FLAT_MATERIALS, FlatMaterial, normal_v)                                \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, optical_depth)                        \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, optical_depth_green)                  \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, optical_depth_blue)                   \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, texture)                              \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, cutout)                               \
+    INTEGERS(FLAT_MATERIALS, FlatMaterial, normal_map)                           \
+    REALS(FLAT_LIGHTS, FlatLight, color)                                         \
+    REALS(FLAT_LIGHTS, FlatLight, position)                                      \
+    REALS(FLAT_LIGHTS, FlatLight, direction)                                     \
+    REALS(FLAT_LIGHTS, FlatLight, cone)                                          \
+    REALS(FLAT_LIGHTS, FlatLight, fading)                                        \
+    REALS(FLAT_LIGHTS, FlatLight, across_u)                                      \
+    REALS(FLAT_LIGHTS, FlatLight, across_v)                                      \
+    INTEGERS(FLAT_LIGHTS, FlatLight, type)                                       \
+    REALS(FLAT_SKY_CELLS, FlatSkyCell, range)                                    \
+    INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, range)                           \
+    INTEGERS(FLAT_TEXELS, Texel, color)                                          \
+    REALS(FLAT_SHARED_MESHES, SharedMesh, extent)                                \
+    INTEGERS(FLAT_SHARED_MESHES, SharedMesh, root_entry)                         \
+    INTEGERS(FLAT_INSTANCE_IDS, InstanceIds, ids)
 // clang-format on
 
 typedef struct {
@@ -121,12 +121,11 @@ typedef struct {
     bool integers;
 } Member;
 
-#define REALS_ENTRY(type, Type, HostType, member)                                                            \
-    {type, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), false},
-#define INTEGERS_ENTRY(type, Type, HostType, member)                                                         \
-    {type, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
-#define SHAPE_ENTRY(feature, Type, name, names)                                                              \
-    INTEGERS_ENTRY(FLAT_FIRST_SHAPE + TYPE_##feature, Type, Type, id)
+#define REALS_ENTRY(type, Type, member)                                                                      \
+    {type, #Type, #member, offsetof(Type, member), sizeof(((Type *)0)->member), false},
+#define INTEGERS_ENTRY(type, Type, member)                                                                   \
+    {type, #Type, #member, offsetof(Type, member), sizeof(((Type *)0)->member), true},
+#define SHAPE_ENTRY(feature, Type, name, names) INTEGERS_ENTRY(FLAT_FIRST_SHAPE + TYPE_##feature, Type, id)
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) PRIMITIVE_LIST(SHAPE_ENTRY)};
 enum { MEMBER_COUNT = COUNT_OF(members) };
 

@@ -2,7 +2,7 @@
 // Standard Procedural Databases 3.14, README, Database analysis), which all classical ray tracers should
 // match within 10%. The test is skipped where the scenes are not there.
 // run_tests: sanitize-long-only
-#include "host/compile/flat_types.h"
+#include "kernels/types.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

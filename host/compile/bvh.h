@@ -4,8 +4,8 @@
 #pragma once
 
 #include "host/base/stage.h"
-#include "host/compile/flat_types.h"
 #include "host/scene/bounds.h"
+#include "kernels/types.h"
 #include <stddef.h>
 #include <stdint.h>
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "host/compile/bvh.h"
-#include "host/compile/flat_types.h"
 
 typedef struct {
     const BvhChild *children[BVH_WIDTH_MAX]; // those with count 0 are also wide nodes

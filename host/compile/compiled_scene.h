@@ -2,7 +2,6 @@
 #pragma once
 
 #include "host/compile/features.h"
-#include "host/compile/flat_types.h"
 #include "host/scene/bounds.h"
 #include <stdbool.h>
 #include <stddef.h>

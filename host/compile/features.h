@@ -2,9 +2,9 @@
 #pragma once
 
 #include "host/base/text.h"
-#include "host/compile/flat_types.h"
 #include "host/scene/scene.h"
 #include "kernels/features.h"
+#include "kernels/types.h"
 #include <stdint.h>
 
 #define FEATURE_BIT_INDEX(name, ...) FEATURE_INDEX_##name,

@@ -1,7 +1,5 @@
 #include "host/render/render_settings.h"
 
-#include "host/compile/flat_types.h"
-
 bool settings_fit(const RenderSettings *settings, const Compute *compute, MessageList *messages)
 {
     const Device *device = compute->device;

@@ -79,8 +79,8 @@ static inline real light_color_error(const Surface *surface, const LightRay *to_
 }
 
 // Extends the bounds of a directional light to those of a point or spot light, where the shadow ray ends.
-static inline void light_add_distance_errors(const Light *light, const Surface *surface, LightRay *to_light,
-                                             LightErrors *errors)
+static inline void light_add_distance_errors(const FlatLight *light, const Surface *surface,
+                                             LightRay *to_light, LightErrors *errors)
 {
     Ray *shadow_ray = &to_light->shadow_ray;
     shadow_ray->ends_at_light = true;
@@ -158,8 +158,9 @@ static inline mask light_set_facing(const Surface *surface, LightRay *to_light, 
 
 // Adds the error of a spotlight's strength, and the lanes that may be on either side of its edge, except for
 // those that are `turned` away.
-static inline void light_add_spot_errors(const Light *light, const Surface *surface, const LightRay *to_light,
-                                         mask turned, LightErrors *errors, LightVisibility *visibility)
+static inline void light_add_spot_errors(const FlatLight *light, const Surface *surface,
+                                         const LightRay *to_light, mask turned, LightErrors *errors,
+                                         LightVisibility *visibility)
 {
     const Vector from_light = vector_negate(to_light->direction), axis = vector_of(light->direction);
     real s = cosine_complement(from_light, axis), edge = (real)(light->cone.x);
@@ -180,7 +181,7 @@ static inline void light_add_spot_errors(const Light *light, const Surface *surf
 
 // Sets the shadow ray's bounds, and what is uncertain before it is traced. Returns the lanes whose errors are
 // too large for cull spheres.
-static inline mask light_set_errors(const Light *light, const Surface *surface, LightRay *to_light,
+static inline mask light_set_errors(const FlatLight *light, const Surface *surface, LightRay *to_light,
                                     LightVisibility *visibility)
 {
     Ray *shadow_ray = &to_light->shadow_ray;

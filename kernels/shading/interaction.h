@@ -72,7 +72,7 @@ static inline ALWAYS_INLINE bool surface_add_object(Surface *surface, SurfacePoi
     points.entry = entry;
     points.uncertain = mask_none();
     if (IS_CERTIFIED) surface_set_point_errors(surface, &points, scene, ray, hit);
-    Material material = scene->materials[entry.z];
+    FlatMaterial material = scene->materials[entry.z];
     if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
         points_set_images(&points, scene, &material, ray, surface->travelled);
     if (HAS_NORMAL_MAPS && material.normal_map.x > 0)

@@ -94,8 +94,8 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *points, co
 
 // Completes the lookup of a material's images. For triangles it already has the coordinates and
 // tangents.
-static inline void points_set_images(LaneSurfacePoints *points, const Scene *scene, const Material *material,
-                                     const Ray *ray, real travelled)
+static inline void points_set_images(LaneSurfacePoints *points, const Scene *scene,
+                                     const FlatMaterial *material, const Ray *ray, real travelled)
 {
     const uint type = points->entry.x, index = points->entry.y;
     const Vector normal = points->point.normal;
@@ -106,7 +106,7 @@ static inline void points_set_images(LaneSurfacePoints *points, const Scene *sce
 }
 
 // Returns the object's color at the hit: plain, checkered or textured.
-static inline Color3 object_color(const Scene *scene, const Material *material, LaneSurfacePoints *points,
+static inline Color3 object_color(const Scene *scene, const FlatMaterial *material, LaneSurfacePoints *points,
                                   const Ray *ray, real position_error)
 {
     Color3 color = vector_of(material->color);

@@ -25,12 +25,12 @@ typedef struct {
     real color_error; // at `certified`, bounds the error of the light's contribution in every channel
 } LightVisibility;
 
-static inline bool light_is_directional(const Light *light)
+static inline bool light_is_directional(const FlatLight *light)
 {
     return light->type.x == LIGHT_TYPE_DIRECTIONAL;
 }
 
-static inline bool light_has_area(const Light *light)
+static inline bool light_has_area(const FlatLight *light)
 {
     return HAS_AREA_LIGHTS && light->type.y != LIGHT_AREA_NONE;
 }
@@ -44,7 +44,7 @@ static inline real cosine_complement(Vector a, Vector b)
 }
 
 // Returns 1 in a spotlight's full cone, 0 outside it, and a smooth value between.
-static inline real spot_strength(const Light *light, Vector from_light)
+static inline real spot_strength(const FlatLight *light, Vector from_light)
 {
     real s = cosine_complement(from_light, vector_of(light->direction));
     real x = ((real)(light->cone.x) - s) * (real)(light->cone.z);
@@ -55,7 +55,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
 }
 
 // Returns the factor, above 0, by which a light fades over the length of `to_light`.
-static inline real light_fading(const Light *light, Vector to_light)
+static inline real light_fading(const FlatLight *light, Vector to_light)
 {
     real light_distance = real_sqrt(vector_dot(to_light, to_light));
     real divisor = real_fma((real)(light->fading.z), light_distance, (real)(light->fading.y));
@@ -65,7 +65,7 @@ static inline real light_fading(const Light *light, Vector to_light)
 
 // Returns the vector from the center of a light's area to the surface's sample of it. A sphere is seen as a
 // disc, whose points are lifted to the sphere.
-static inline Vector light_area_offset(const Light *light, uint index, const Surface *surface)
+static inline Vector light_area_offset(const FlatLight *light, uint index, const Surface *surface)
 {
     SquarePoint point = sample_point(&surface->sample, SAMPLED_LIGHTS + index);
     if (light->type.y == LIGHT_AREA_TRIANGLE)
@@ -88,8 +88,8 @@ static inline Vector light_area_offset(const Light *light, uint index, const Sur
 
 // Returns the direction of the surface's sample of the sky's light, a random one if there is one sample per
 // pixel. Sets *tint to the light from there, in fractions of the light's color.
-static inline Vector sky_sample(const Scene *scene, const Light *light, uint index, const Surface *surface,
-                                Color3 *tint)
+static inline Vector sky_sample(const Scene *scene, const FlatLight *light, uint index,
+                                const Surface *surface, Color3 *tint)
 {
     global const SceneHeader *header = scene->header;
     Sample sample = surface->sample;
@@ -132,7 +132,7 @@ static inline LightRay light_ray_along(const Surface *surface, Vector direction)
     return to_light;
 }
 
-static inline LightRay directional_light_ray(const Scene *scene, const Light *light, uint index,
+static inline LightRay directional_light_ray(const Scene *scene, const FlatLight *light, uint index,
                                              const Surface *surface)
 {
     Vector direction = vector_negate(vector_of(light->direction));
@@ -150,7 +150,7 @@ static inline LightRay directional_light_ray(const Scene *scene, const Light *li
 
 // Returns the ray to a point or spot light. Its shadow ray is not normalized, so that the light is at t = 1.
 // It ends 32 u before that, so that a surface on which the light lies does not occlude it.
-static inline LightRay positional_light_ray(const Light *light, uint index, const Surface *surface)
+static inline LightRay positional_light_ray(const FlatLight *light, uint index, const Surface *surface)
 {
     Vector position = vector_of(light->position), start = shadow_ray_origin(surface);
     if (light_has_area(light)) position = vector_add(position, light_area_offset(light, index, surface));
@@ -167,7 +167,8 @@ static inline LightRay positional_light_ray(const Light *light, uint index, cons
     return to_light;
 }
 
-static inline LightRay light_ray(const Scene *scene, const Light *light, uint index, const Surface *surface)
+static inline LightRay light_ray(const Scene *scene, const FlatLight *light, uint index,
+                                 const Surface *surface)
 {
     bool has_positional_lights = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positional_lights || light_is_directional(light)))

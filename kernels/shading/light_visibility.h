@@ -9,7 +9,7 @@
 static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
                                           Ray *shadow_ray)
 {
-    Light light = scene->lights[index];
+    FlatLight light = scene->lights[index];
     LightRay to_light = light_ray(scene, &light, index, surface);
     LightVisibility visibility;
     visibility.fraction = to_light.strength;

@@ -45,7 +45,7 @@ typedef struct {
 
 // Returns the unit shading normal tilted by the material's normal map, for the lanes in `wanted`. A map that
 // is mirrored on the surface has its v on the other side of the normal and u.
-static inline Vector normal_tilted(const Scene *scene, const Material *material, uint type,
+static inline Vector normal_tilted(const Scene *scene, const FlatMaterial *material, uint type,
                                    const ImageLookup *lookup, Vector normal, mask wanted)
 {
     const TextureCoordinates coordinates = lookup->coordinates;

@@ -57,7 +57,7 @@ static inline Vector surface_normal(const Surface *surface)
 
 // Sets the material in some lanes. `color` is the object's.
 static inline void surface_set_material(Surface *surface, const Scene *scene, mask lanes,
-                                        const Material *material, Color3 color)
+                                        const FlatMaterial *material, Color3 color)
 {
     const scalar4 bounces = material->reflection_transmission_ior;
     Color3 ambient =

@@ -86,7 +86,7 @@ static inline real grid_error(const Scene *scene, uint type, uint index, Vector 
 }
 
 static inline TextureCoordinates texture_coordinates(const Scene *scene, uint type, uint index,
-                                                     const Material *material, const SurfacePoint *point)
+                                                     const FlatMaterial *material, const SurfacePoint *point)
 {
     if (HAS_SPHERES && type == TYPE_SPHERES) {
         Sphere sphere = scene->spheres[index];

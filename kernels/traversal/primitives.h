@@ -255,12 +255,6 @@ static inline void intersect_object(Traversal *traversal, const Scene *scene, co
     SHAPE_LIST(INTERSECT_OBJECT)
 }
 
-// Returns whether the leaves of a type are blocks.
-static inline bool type_has_blocks(uint type)
-{
-    return LANES > 1 && (type == TYPE_SPHERES || type == TYPE_TRIANGLES);
-}
-
 // Intersects a leaf, given as count << 8 | type (BvhNode.child_type) and its first primitive. Blocks and
 // instances are skipped.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
@@ -268,7 +262,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 {
     const uint type = leaf_type(leaf), last = first + leaf_count(leaf);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && !type_has_blocks(TYPE_##feature) && type == TYPE_##feature)                         \
+    if (HAS_##feature && !(LANES > 1 && type_has_blocks(TYPE_##feature)) && type == TYPE_##feature)          \
         return intersect_##names(traversal, scene, ray, first, last);
     SHAPE_LIST(INTERSECT_LEAF)
     return false;

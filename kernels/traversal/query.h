@@ -81,7 +81,7 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
         traversal->active = traversal->active & !found;
         return;
     }
-    global const Material *material = &scene->materials[object_material(traversal, scene, id)];
+    global const FlatMaterial *material = &scene->materials[object_material(traversal, scene, id)];
     integer optical_depth =
         optical_depth_sum(traversal->optical_depth, optical_depth_steps(material->optical_depth));
     traversal->optical_depth = lanes_select(found, optical_depth, traversal->optical_depth);
