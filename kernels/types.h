@@ -413,14 +413,15 @@ enum {
     LIGHT_AREA_SKY
 };
 
-// One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's
+// One of SKY_CELL_ROWS x SKY_CELL_COLUMNS ranges of directions with nearly equal light, laid out as the sky's
 // image.
 typedef struct {
     // x: least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
     scalar4 range;
 } FlatSkyCell;
 
-enum { SKY_ROWS = 128, SKY_COLUMNS = 128 };
+#define SKY_CELL_ROWS    128
+#define SKY_CELL_COLUMNS 128
 
 typedef struct {
     scalar4 color;     // w: the largest of its channels

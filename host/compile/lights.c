@@ -9,9 +9,6 @@ _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT
                    (int)AREA_TRIANGLE == LIGHT_AREA_TRIANGLE && (int)AREA_SKY == LIGHT_AREA_SKY,
                "areas of lights have the kernels' numbers");
 
-_Static_assert((int)SKY_CELL_ROWS == SKY_ROWS && (int)SKY_CELL_COLUMNS == SKY_COLUMNS,
-               "the sky has the kernels' cells");
-
 // Returns 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
 {
@@ -49,7 +46,8 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
 
 void sky_cells_flatten(CompiledScene *compiled, const Scene *scene)
 {
-    flat_array_renew(compiled, FLAT_SKY_CELLS, scene->sky.cells ? (size_t)SKY_ROWS * SKY_COLUMNS : 0);
+    flat_array_renew(compiled, FLAT_SKY_CELLS,
+                     scene->sky.cells ? (size_t)SKY_CELL_ROWS * SKY_CELL_COLUMNS : 0);
     FlatSkyCell *cells = compiled->arrays[FLAT_SKY_CELLS].items;
     for (size_t i = 0; i < compiled->arrays[FLAT_SKY_CELLS].count; i++) {
         const SkyCell *cell = &scene->sky.cells[i];

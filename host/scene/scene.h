@@ -303,7 +303,9 @@ typedef struct {
     double longitude_begin, longitude_end, sine_begin, sine_end;
 } SkyCell;
 
-enum { SKY_CELL_ROWS = 128, SKY_CELL_COLUMNS = 128 };
+// kernels/types.h has the same definitions. The compiler warns if they differ.
+#define SKY_CELL_ROWS    128
+#define SKY_CELL_COLUMNS 128
 
 // What a format's colors mean, which is linear light or values that a display shows unchanged.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;

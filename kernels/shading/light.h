@@ -96,11 +96,12 @@ static inline Vector sky_sample(const Scene *scene, const FlatLight *light, uint
     if (sample.index == SAMPLE_CENTER) sample.index = 0;
     SquarePoint point = sample_point(&sample, SAMPLED_LIGHTS + index);
     const real one = (real)(1);
-    real columns = (point.x + one) * (SKY_COLUMNS / 2), rows = (point.y + one) * (SKY_ROWS / 2);
+    real columns = (point.x + one) * (SKY_CELL_COLUMNS / 2), rows = (point.y + one) * (SKY_CELL_ROWS / 2);
     RealLanes column = {floor(columns)}, row = {floor(rows)};
     RealLanes longitude, longitudes, sine, sines;
     for (uint lane = 0; lane < LANES; lane++) {
-        scalar4 cell = scene->sky_cells[(uint)row.each[lane] * SKY_COLUMNS + (uint)column.each[lane]].range;
+        scalar4 cell =
+            scene->sky_cells[(uint)row.each[lane] * SKY_CELL_COLUMNS + (uint)column.each[lane]].range;
         longitude.each[lane] = cell.x;
         longitudes.each[lane] = cell.y;
         sine.each[lane] = cell.z;
