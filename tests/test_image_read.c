@@ -76,7 +76,7 @@ TEST(png_of_other_colors)
 }
 
 // Writes a JPEG of 32 x 16 pixels, whose quarters have the gray levels 0, 80, 160 and 240 in reading order,
-// with application segments before its image.
+// with application segments or other bytes before its image.
 static void jpeg_write(const char *path, const char *segments, size_t length, int pixel_format)
 {
     enum { WIDTH = 32, HEIGHT = 16 };
@@ -123,6 +123,37 @@ TEST(jpeg_is_turned_upright)
     }
 }
 
+static void check_refused(const char *bytes, size_t length, const char *reason)
+{
+    file_write_bytes("bad", bytes, length);
+    MessageList messages = {0};
+    Image image;
+    assert_false(image_read(&image, "bad", NULL, &messages));
+    assert_null(image.values);
+    check_only_message(&messages, formatted("cannot read 'bad': %s", reason));
+}
+
+// Bytes between segments are skipped, and the rows that a file lacks are gray. A file that ends before its
+// image is refused.
+TEST(damaged_jpeg)
+{
+    jpeg_write("a.jpg", "", 0, TJPF_RGBX);
+    OwnedImage expected = image_read_file("a.jpg");
+    OwnedMessageList messages = {0};
+    OwnedText text = {0};
+    assert_true(text_read_file(&text, "a.jpg", &messages));
+    jpeg_write("a.jpg", "\xFF\xFE\0\2xy", 6, TJPF_RGBX);
+    check_warning("a.jpg",
+                  "'a.jpg': JPEG: Corrupt JPEG data: 2 extraneous bytes before marker 0xe0; the image "
+                  "may be damaged");
+    OwnedImage image;
+    assert_true(image_read(&image, "a.jpg", NULL, &messages));
+    assert_memory_equal(image.values, expected.values, sizeof *image.values * 32 * 16 * 3);
+    file_write_bytes("a.jpg", text.items, text.count - 20);
+    check_warning("a.jpg", "the image may be damaged");
+    check_refused(text.items, 100, "JPEG: Premature end of JPEG file");
+}
+
 TEST(jpeg_of_other_colors)
 {
     static const char p3[] = "\xFF\xE2\0\x1A"
@@ -139,16 +170,6 @@ TEST(jpeg_of_other_colors)
     assert_false(image_read(&image, "a.jpg", NULL, &messages));
     check_only_message(&messages, "cannot read 'a.jpg': JPEG: CMYK colors are not supported; "
                                   "convert the image to RGB");
-}
-
-static void check_refused(const char *bytes, size_t length, const char *reason)
-{
-    file_write_bytes("bad", bytes, length);
-    MessageList messages = {0};
-    Image image;
-    assert_false(image_read(&image, "bad", NULL, &messages));
-    assert_null(image.values);
-    check_only_message(&messages, formatted("cannot read 'bad': %s", reason));
 }
 
 #define CHECK_REFUSED(bytes, reason) check_refused(bytes, sizeof(bytes) - 1, reason)

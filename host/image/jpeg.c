@@ -77,21 +77,26 @@ static void profile_check(const ImageFile *file)
 
 static bool jpeg_pixels(tjhandle decoder, Image *image, const ImageFile *file)
 {
-    int width, height, sampling, color_space;
-    if (tjDecompressHeader3(decoder, file->bytes, file->length, &width, &height, &sampling, &color_space))
+    int width = 0, height = 0, sampling = 0, color_space = 0;
+    const int status =
+        tjDecompressHeader3(decoder, file->bytes, file->length, &width, &height, &sampling, &color_space);
+    if (width == 0 || (status && tjGetErrorCode(decoder) != TJERR_WARNING)) // decompression repeats warnings
         return image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
     if (color_space == TJCS_CMYK || color_space == TJCS_YCCK)
         return image_refuse(file, "JPEG: CMYK colors are not supported; convert the image to RGB");
     if (!image_allocate(image, file, (uint64_t)width, (uint64_t)height, 3, JPEG_EXPANSION)) return false;
     const size_t count = (size_t)image->width * image->height * 3;
-    uint8_t *bytes = calloc(count, 1);
+    OWNED uint8_t *bytes = calloc(count, 1);
     if (!bytes) return image_refuse(file, "the image does not fit into memory");
-    const bool is_read = tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
-                                       TJFLAG_ACCURATEDCT) == 0;
+    if (tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
+                      TJFLAG_ACCURATEDCT)) {
+        if (tjGetErrorCode(decoder) != TJERR_WARNING)
+            return image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
+        image_warn(file, "JPEG: %s; the image may be damaged", tjGetErrorStr2(decoder));
+    }
     for (size_t i = 0; i < count; i++)
         image->values[i] = (float)bytes[i] / 255.0F;
-    free(bytes);
-    return is_read || image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
+    return true;
 }
 
 bool jpeg_decode(Image *image, const ImageFile *file)
