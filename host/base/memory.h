@@ -34,8 +34,8 @@ static inline void memory_free_owned(void *variable)
 }
 
 // Declares a pointer whose memory is freed where its scope ends, as in `OWNED char *path =
-// text_format(...);`. It must be initialized. The headers of other types that own memory define OwnedText,
-// OwnedImage and so on in the same way.
+// text_format(...);`, or an ARRAY_OF, whose items are freed. It must be initialized. The headers of other
+// types that own memory define OwnedText, OwnedImage and so on in the same way.
 #define OWNED __attribute__((cleanup(memory_free_owned)))
 
 // Returns the pointer of an OWNED variable, which is NULL afterwards, so that the caller owns the memory.

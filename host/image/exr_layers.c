@@ -4,6 +4,7 @@
 #include "host/image/exr_layers.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <stdlib.h>
@@ -136,7 +137,7 @@ static void names_add(Text *names, const char *name, size_t length)
 
 static bool channels_refuse(exr_const_context_t context, const ImageFile *file, const char *problem)
 {
-    Text names = {0};
+    OwnedText names = {0};
     int part_count = 0;
     exr_get_count(context, &part_count);
     for (int part = 0; part < part_count; part++) {
@@ -145,15 +146,14 @@ static bool channels_refuse(exr_const_context_t context, const ImageFile *file, 
         for (int i = 0; i < channels->num_channels; i++)
             names_add(&names, channels->entries[i].name.str, strlen(channels->entries[i].name.str));
     }
-    image_refuse(file, "EXR: %s; its channels are %s", problem, names.count > 0 ? text_c(&names) : "none");
-    text_free(&names);
-    return false;
+    return image_refuse(file, "EXR: %s; its channels are %s", problem,
+                        names.count > 0 ? text_c(&names) : "none");
 }
 
 // Returns false with a message that lists the layers with light, or those without, as ambiguous.
 static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool with_light)
 {
-    Text names = {0};
+    OwnedText names = {0};
     for (size_t i = 0; i < list->count; i++) {
         const Candidate *candidate = &list->items[i];
         const ExrForm form = layer_of(candidate).form;
@@ -163,9 +163,7 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
         else
             names_add(&names, "default", strlen("default"));
     }
-    image_refuse(file, "EXR: several layers, %s; name one", text_c(&names));
-    text_free(&names);
-    return false;
+    return image_refuse(file, "EXR: several layers, %s; name one", text_c(&names));
 }
 
 static bool part_has_name(exr_const_context_t context, int part, const char *name)
@@ -226,22 +224,14 @@ static bool unnamed_layer_find(exr_const_context_t context, const CandidateList 
 
 bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer *layer)
 {
-    CandidateList list = {0};
+    OWNED CandidateList list = {0};
     int part_count = 0;
     exr_result_t code = exr_get_count(context, &part_count);
     for (int part = 0; part < part_count && code == EXR_ERR_SUCCESS && !list.has_more; part++)
         code = candidates_add_part(&list, context, part);
-    bool found = false;
-    if (code != EXR_ERR_SUCCESS)
-        image_refuse(file, "EXR: %s", exr_get_default_error_message(code));
-    else if (list.has_more)
-        image_refuse(file, "EXR: more than %d layers", LAYERS_MAX);
-    else if (list.count == 0 && part_count > 0)
-        image_refuse(file, "EXR: deep images are not supported");
-    else if (file->options.layer)
-        found = named_layer_find(context, &list, file, layer);
-    else
-        found = unnamed_layer_find(context, &list, file, layer);
-    free(list.items);
-    return found;
+    if (code != EXR_ERR_SUCCESS) return image_refuse(file, "EXR: %s", exr_get_default_error_message(code));
+    if (list.has_more) return image_refuse(file, "EXR: more than %d layers", LAYERS_MAX);
+    if (list.count == 0 && part_count > 0) return image_refuse(file, "EXR: deep images are not supported");
+    return file->options.layer ? named_layer_find(context, &list, file, layer)
+                               : unnamed_layer_find(context, &list, file, layer);
 }

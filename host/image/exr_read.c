@@ -18,7 +18,7 @@ typedef struct {
     uint32_t width, height;
     uint32_t across, down; // pixels per sample
     bool is_integer;       // the bits are of uint32
-} Plane;
+} ExrPlane;
 
 typedef struct {
     const ImageFile *file;
@@ -26,7 +26,7 @@ typedef struct {
     ExrLayer layer;
     exr_attr_box2i_t window; // pixels with data
     int64_t left, top;       // of the image in these
-    Plane planes[4];
+    ExrPlane planes[4];
     char problem[256];
 } ExrReader;
 
@@ -69,7 +69,7 @@ static uint32_t sample_count(uint32_t pixels, int sampling)
     return sampling > 0 ? (pixels + (uint32_t)sampling - 1) / (uint32_t)sampling : 0;
 }
 
-static uint64_t extent_of(int32_t min, int32_t max)
+static uint64_t window_extent(int32_t min, int32_t max)
 {
     return max < min ? 0 : (uint64_t)((int64_t)max - min + 1);
 }
@@ -93,8 +93,8 @@ static bool planes_allocate(ExrReader *reader, Image *store)
     if ((uint64_t)chunk_count > reader->file->length / 16)
         return image_refuse(reader->file, "EXR: the file is too short for its image");
     const exr_attr_box2i_t *window = &reader->window;
-    if (!image_allocate(store, reader->file, extent_of(window->min.x, window->max.x),
-                        extent_of(window->min.y, window->max.y), plane_count(layer), 65536))
+    if (!image_allocate(store, reader->file, window_extent(window->min.x, window->max.x),
+                        window_extent(window->min.y, window->max.y), plane_count(layer), 65536))
         return false;
     for (uint32_t i = 0; i < plane_count(layer); i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[layer->channels[i]];
@@ -103,20 +103,20 @@ static bool planes_allocate(ExrReader *reader, Image *store)
         if ((is_integer && layer->form != EXR_NUMBERS) || !(is_full || layer->form == EXR_CHROMA))
             return image_refuse(reader->file, "EXR: channel %s is not of floats or not of full resolution",
                                 entry->name.str);
-        reader->planes[i] = (Plane){layer->channels[i],
-                                    store->values + (size_t)i * store->width * store->height,
-                                    sample_count(store->width, entry->x_sampling),
-                                    sample_count(store->height, entry->y_sampling),
-                                    (uint32_t)entry->x_sampling,
-                                    (uint32_t)entry->y_sampling,
-                                    is_integer};
+        reader->planes[i] = (ExrPlane){layer->channels[i],
+                                       store->values + (size_t)i * store->width * store->height,
+                                       sample_count(store->width, entry->x_sampling),
+                                       sample_count(store->height, entry->y_sampling),
+                                       (uint32_t)entry->x_sampling,
+                                       (uint32_t)entry->y_sampling,
+                                       is_integer};
     }
     return true;
 }
 
 // Sets the destination of a channel's values: a plane, or a scratch buffer. OpenEXR 3.1 writes through the
 // null pointer that should make it skip a channel if there are three channels of halves.
-static void channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t row_values)
+static void decoded_channel_place(exr_coding_channel_info_t *channel, float *place, uint32_t row_values)
 {
     channel->decode_to_ptr = (uint8_t *)place;
     channel->user_pixel_stride = sizeof *place;
@@ -128,15 +128,15 @@ static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipel
                            uint32_t x, uint32_t y)
 {
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(&pipeline->channels[i], scratch, (uint32_t)pipeline->chunk.width);
+        decoded_channel_place(&pipeline->channels[i], scratch, (uint32_t)pipeline->chunk.width);
     for (uint32_t i = 0; i < plane_count(&reader->layer); i++) {
-        const Plane *plane = &reader->planes[i];
+        const ExrPlane *plane = &reader->planes[i];
         exr_coding_channel_info_t *channel = &pipeline->channels[plane->channel];
         const uint32_t column = x / plane->across, row = y / plane->down;
         if (channel->width < 0 || channel->height < 0 || (uint64_t)channel->width + column > plane->width ||
             (uint64_t)channel->height + row > plane->height)
             return false;
-        channel_place(channel, plane->values + (size_t)row * plane->width + column, plane->width);
+        decoded_channel_place(channel, plane->values + (size_t)row * plane->width + column, plane->width);
         channel->user_bytes_per_element = sizeof *plane->values;
         channel->user_data_type = plane->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
     }
@@ -151,12 +151,11 @@ static exr_result_t exr_chunk(const ExrReader *reader, const exr_chunk_info_t *c
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     exr_result_t code = exr_decoding_initialize(reader->context, part, chunk, &pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
-    float *scratch = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *scratch);
+    OWNED float *scratch = memory_allocate((size_t)chunk->width * (size_t)chunk->height, sizeof *scratch);
     if (!channels_place(reader, &pipeline, scratch, x, y)) code = EXR_ERR_BAD_CHUNK_LEADER;
     EXR_STEP(code, exr_decoding_choose_default_routines(reader->context, part, &pipeline));
     EXR_STEP(code, exr_decoding_run(reader->context, part, &pipeline));
     exr_decoding_destroy(reader->context, &pipeline);
-    free(scratch);
     return code;
 }
 
@@ -192,7 +191,7 @@ static exr_result_t exr_tiles(const ExrReader *reader, uint32_t width, uint32_t 
 }
 
 // Copies the value at a pixel of the data. Interpolates bilinearly between samples.
-static void plane_sample(const Plane *plane, uint32_t x, uint32_t y, float *pixel)
+static void plane_sample(const ExrPlane *plane, uint32_t x, uint32_t y, float *pixel)
 {
     const uint32_t column = x / plane->across, row = y / plane->down;
     const float *value = plane->values + (size_t)row * plane->width + column;
@@ -256,7 +255,7 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
 static void alpha_open(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
     if (!reader->layer.has_alpha) return;
-    const Plane *plane = &reader->planes[reader->layer.channel_count];
+    const ExrPlane *plane = &reader->planes[reader->layer.channel_count];
     bool is_opaque = reader->left >= 0 && reader->top >= 0 && reader->left + image->width <= width &&
                      reader->top + image->height <= height;
     for (size_t i = 0; i < (size_t)width * height && is_opaque; i++)
@@ -303,20 +302,17 @@ static bool exr_pixels(ExrReader *reader, Image *image)
     if (code != EXR_ERR_SUCCESS) return exr_refuse(reader, code);
     reader->left = (int64_t)display.min.x - reader->window.min.x;
     reader->top = (int64_t)display.min.y - reader->window.min.y;
-    Image store = {0};
-    const bool done =
-        exr_decode_planes(reader, &store) &&
-        image_allocate(image, reader->file, extent_of(display.min.x, display.max.x),
-                       extent_of(display.min.y, display.max.y), layer->channel_count, UINT64_MAX);
-    if (done) {
-        image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
-        alpha_open(reader, image, store.width, store.height);
-        image_fill(reader, image, store.width, store.height);
-        if (reader->planes[0].is_integer) integers_widen(image);
-        if (!image->data) primaries_check(reader);
-    }
-    image_free(&store);
-    return done;
+    OwnedImage store = {0};
+    if (!exr_decode_planes(reader, &store) ||
+        !image_allocate(image, reader->file, window_extent(display.min.x, display.max.x),
+                        window_extent(display.min.y, display.max.y), layer->channel_count, UINT64_MAX))
+        return false;
+    image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
+    alpha_open(reader, image, store.width, store.height);
+    image_fill(reader, image, store.width, store.height);
+    if (reader->planes[0].is_integer) integers_widen(image);
+    if (!image->data) primaries_check(reader);
+    return true;
 }
 
 bool exr_decode(Image *image, const ImageFile *file)

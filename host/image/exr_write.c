@@ -154,10 +154,8 @@ static exr_result_t exr_header(ImageWriter *writer)
     EXR_STEP(code, channels_declare(state));
     for (const ImageNote *note = header->notes; note && note->key; note++) {
         // The prefix separates keys such as `version` from the format's own.
-        Text key = {0};
-        text_appendf(&key, "glint.%s", note->key);
-        EXR_STEP(code, exr_attr_set_string(state->context, 0, text_c(&key), note->value));
-        text_free(&key);
+        OWNED char *key = text_format("glint.%s", note->key);
+        EXR_STEP(code, exr_attr_set_string(state->context, 0, key, note->value));
     }
     EXR_STEP(code, exr_write_header(state->context));
     int32_t block_rows = 0;
@@ -196,8 +194,8 @@ typedef struct {
 } BlockRows;
 
 // Points a channel of the file at its values in the block's rows.
-static void channel_place(const ExrWriter *state, exr_encode_pipeline_t *pipeline, const BlockRows *rows,
-                          int index, uint32_t width)
+static void encoded_channel_place(const ExrWriter *state, exr_encode_pipeline_t *pipeline,
+                                  const BlockRows *rows, int index, uint32_t width)
 {
     const ExrChannel *from = &state->channels[index];
     const WrittenLayer *layer = &state->layers[from->layer];
@@ -268,7 +266,7 @@ static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32
     if (code != EXR_ERR_SUCCESS) return code;
     block->has_pipeline = true;
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(state, pipeline, rows, i, writer->header.width);
+        encoded_channel_place(state, pipeline, rows, i, writer->header.width);
     if (is_first) code = pipeline_prepare(state, pipeline);
     if (code != EXR_ERR_SUCCESS) return code;
     state->block_count++;
@@ -300,18 +298,18 @@ static bool exr_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
     BlockRows held;
     for (size_t i = 0; i < state->layer_count; i++)
         held.layers[i] = state->layers[i].rows_held;
-    for (uint32_t row = 0, taken; row < row_count && code == EXR_ERR_SUCCESS; row += taken) {
+    for (uint32_t row = 0, count; row < row_count && code == EXR_ERR_SUCCESS; row += count) {
         const uint32_t left = writer->header.height - state->block_start;
         const uint32_t block_rows = left < state->block_rows ? left : state->block_rows;
         BlockRows rows;
         for (size_t i = 0; i < state->layer_count; i++)
             rows.layers[i] = (const uint8_t *)arrays[i] + row * layer_row_size(writer, &state->layers[i]);
-        taken = block_rows - state->rows_held;
-        if (taken > row_count - row) taken = row_count - row;
-        if (taken == block_rows) {
+        count = block_rows - state->rows_held;
+        if (count > row_count - row) count = row_count - row;
+        if (count == block_rows) {
             code = block_add(writer, &rows, block_rows);
         } else {
-            code = rows_hold(writer, &rows, taken);
+            code = rows_hold(writer, &rows, count);
             if (state->rows_held == block_rows) EXR_STEP(code, block_add(writer, &held, block_rows));
         }
     }

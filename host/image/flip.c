@@ -97,6 +97,7 @@ static void channel_close(Channel *channel)
 {
     free(channel->values);
 }
+#define OwnedChannel __attribute__((cleanup(channel_close))) Channel
 
 static float *channel_row(const Channel *channel, uint32_t y)
 {
@@ -114,7 +115,7 @@ typedef struct {
 static void filter_across(const Filter *filter, const Channel *in, Channel *out)
 {
     size_t width = in->width, radius = (size_t)filter->radius;
-    float *padded = memory_allocate(width + 2 * radius, sizeof *padded);
+    OWNED float *padded = memory_allocate(width + 2 * radius, sizeof *padded);
     for (uint32_t y = 0; y < in->height; y++) {
         const float *row = channel_row(in, y);
         memcpy(padded + radius, row, width * sizeof *row);
@@ -128,7 +129,6 @@ static void filter_across(const Filter *filter, const Channel *in, Channel *out)
             for (size_t x = 0; x < width; x++)
                 result[x] += filter->weights[tap] * padded[x + tap];
     }
-    free(padded);
 }
 
 static void filter_down(const Filter *filter, const Channel *in, Channel *out)
@@ -148,10 +148,10 @@ static void filter_down(const Filter *filter, const Channel *in, Channel *out)
 
 static Channel channel_filter(const Channel *in, const Filter *across, const Filter *down)
 {
-    Channel between = channel_open(in->width, in->height), out = channel_open(in->width, in->height);
+    OwnedChannel between = channel_open(in->width, in->height);
     filter_across(across, in, &between);
+    Channel out = channel_open(in->width, in->height);
     filter_down(down, &between, &out);
-    channel_close(&between);
     return out;
 }
 
@@ -228,11 +228,10 @@ static Channel feature_strength(const Channel *gray, double (*shape)(double x, d
     int radius = (int)ceil(3 * deviation);
     Filter detector = filter_make(shape, deviation, radius),
            smooth = filter_make(gaussian, deviation, radius);
-    Channel across = channel_filter(gray, &detector, &smooth),
-            down = channel_filter(gray, &smooth, &detector);
+    Channel across = channel_filter(gray, &detector, &smooth);
+    OwnedChannel down = channel_filter(gray, &smooth, &detector);
     for (size_t i = 0; i < (size_t)gray->width * gray->height; i++)
         across.values[i] = hypotf(across.values[i], down.values[i]);
-    channel_close(&down);
     return across;
 }
 
@@ -251,7 +250,7 @@ typedef struct {
 static Seen seen_open(const float *image, uint32_t width, uint32_t height)
 {
     Seen seen;
-    Channel gray = channel_open(width, height);
+    OwnedChannel gray = channel_open(width, height);
     for (int i = 0; i < 3; i++)
         seen.ycc[i] = channel_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
@@ -263,7 +262,6 @@ static Seen seen_open(const float *image, uint32_t width, uint32_t height)
     }
     seen.edges = feature_strength(&gray, gaussian_derivative);
     seen.points = feature_strength(&gray, gaussian_second_derivative);
-    channel_close(&gray);
     for (int i = 0; i < 3; i++)
         channel_blur(&seen.ycc[i], i);
     return seen;
@@ -276,6 +274,7 @@ static void seen_close(Seen *seen)
     channel_close(&seen->edges);
     channel_close(&seen->points);
 }
+#define OwnedSeen __attribute__((cleanup(seen_close))) Seen
 
 static double clipped(double value)
 {
@@ -318,7 +317,7 @@ double flip_of_colors(const float reference[3], const float test[3])
 
 void flip_map(const float *reference, const float *test, uint32_t width, uint32_t height, float *map)
 {
-    Seen seen = seen_open(reference, width, height), other = seen_open(test, width, height);
+    OwnedSeen seen = seen_open(reference, width, height), other = seen_open(test, width, height);
     const double largest = largest_distance();
     for (size_t i = 0; i < (size_t)width * height; i++) {
         double color = compressed(color_distance(seen_color_at(&seen, i), seen_color_at(&other, i)), largest);
@@ -327,6 +326,4 @@ void flip_map(const float *reference, const float *test, uint32_t width, uint32_
         double feature = pow(fmax(edge, point) / sqrt(2), feature_exponent);
         map[i] = (float)pow(color, 1 - fmin(feature, 1)); // section 4.3
     }
-    seen_close(&seen);
-    seen_close(&other);
 }

@@ -48,12 +48,10 @@ bool heatmap_write(const char *path, const float *errors, uint32_t width, uint32
         .notes = (const ImageNote[]){{"Title", "heat map of errors"}, {"Scale", scale}, {NULL, NULL}},
     };
     const size_t count = (size_t)width * height;
-    float *colors = memory_allocate(count, 3 * sizeof *colors);
+    OWNED float *colors = memory_allocate(count, 3 * sizeof *colors);
     for (size_t i = 0; i < count; i++)
         heatmap_error_color((double)errors[i], largest, colors + 3 * i);
     for (size_t i = 0; image_format_holds_floats(header.format) && i < 3 * count; i++)
         colors[i] = (float)srgb_decode((double)colors[i]);
-    const bool is_written = image_write(path, &header, colors, messages);
-    free(colors);
-    return is_written;
+    return image_write(path, &header, colors, messages);
 }

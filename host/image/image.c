@@ -151,37 +151,34 @@ bool image_write(const char *path, const ImageHeader *header, const void *pixels
 
 bool image_refuse(const ImageFile *file, const char *format, ...)
 {
-    char *reason;
+    OWNED char *reason = NULL;
     ARGUMENTS_FORMAT(reason, format);
-    message_error(file->messages, "cannot read '%s': %s", file->path, reason);
-    free(reason);
-    return false;
+    return message_error(file->messages, "cannot read '%s': %s", file->path, reason);
 }
 
 void image_warn(const ImageFile *file, const char *format, ...)
 {
-    char *loss;
+    OWNED char *loss = NULL;
     ARGUMENTS_FORMAT(loss, format);
     message_warning(file->messages, "'%s': %s", file->path, loss);
-    free(loss);
 }
 
 bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
                     uint64_t expansion)
 {
     if (width == 0 || height == 0 || channels == 0) return image_refuse(file, "the image is empty");
-    uint64_t values, bytes, most;
-    if (__builtin_mul_overflow(file->length, expansion, &most)) most = UINT64_MAX;
+    uint64_t values, bytes, bytes_max;
+    if (__builtin_mul_overflow(file->length, expansion, &bytes_max)) bytes_max = UINT64_MAX;
     if (width > UINT32_MAX || height > UINT32_MAX || channels > UINT32_MAX ||
         __builtin_mul_overflow(width * height, channels, &values) ||
-        __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > most)
+        __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > bytes_max)
         return image_refuse(file, "the file is too short for its image");
     const uint32_t max_pixels = file->options.max_pixels ? file->options.max_pixels : IMAGE_PIXELS_MAX;
     if (width * height > max_pixels)
         return image_refuse(file, "the image has %ju x %ju pixels; max-pixels allows %u", (uintmax_t)width,
                             (uintmax_t)height, max_pixels);
-    size_t count;
-    if (__builtin_add_overflow(values, 0, &count) || !(image->values = calloc(count, sizeof *image->values)))
+    if (values > SIZE_MAX / sizeof *image->values ||
+        !(image->values = calloc((size_t)values, sizeof *image->values)))
         return image_refuse(file, "the image does not fit into memory");
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;
@@ -245,11 +242,9 @@ bool image_read_bytes(Image *image, const Source *source, const ImageReadOptions
 bool image_read(Image *image, const char *path, const ImageReadOptions *options, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
-    Text text = {0};
-    const bool done = text_read_file(&text, path, messages) &&
-                      image_read_bytes(image, &(Source){path, text_c(&text), text.count}, options, messages);
-    text_free(&text);
-    return done;
+    OwnedText text = {0};
+    return text_read_file(&text, path, messages) &&
+           image_read_bytes(image, &(Source){path, text_c(&text), text.count}, options, messages);
 }
 
 double image_value(const Image *image, size_t i)

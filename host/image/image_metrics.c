@@ -29,7 +29,7 @@ double value_error(double reference, double test)
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count)
 {
     ErrorSummary summary = {.psnr = INFINITY};
-    float *magnitudes = memory_allocate(count, sizeof *magnitudes);
+    OWNED float *magnitudes = memory_allocate(count, sizeof *magnitudes);
     double sum = 0, square_sum = 0, relative_sum = 0;
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(reference[i]) || !isfinite(test[i])) continue;
@@ -41,15 +41,13 @@ ErrorSummary error_summarize(const double *reference, const double *test, size_t
         summary.largest = fmax(summary.largest, fabs(difference));
         magnitudes[summary.count++] = (float)fabs(difference);
     }
-    if (summary.count > 0) {
-        double compared = (double)summary.count;
-        summary.bias = sum / compared;
-        summary.rmse = sqrt(square_sum / compared);
-        summary.rel_mse = relative_sum / compared;
-        summary.psnr = -20 * log10(summary.rmse);
-        summary.percentile_999 = percentile_999(magnitudes, summary.count);
-    }
-    free(magnitudes);
+    if (summary.count == 0) return summary;
+    const double compared = (double)summary.count;
+    summary.bias = sum / compared;
+    summary.rmse = sqrt(square_sum / compared);
+    summary.rel_mse = relative_sum / compared;
+    summary.psnr = -20 * log10(summary.rmse);
+    summary.percentile_999 = percentile_999(magnitudes, summary.count);
     return summary;
 }
 
@@ -96,11 +94,9 @@ static float pixel_error(const double *expected, const double *found, uint32_t c
 void image_errors(const Image *reference, const Image *test, float *errors)
 {
     const uint32_t channels = reference->channels;
-    double *expected = linear_values(reference), *found = linear_values(test);
+    OWNED double *expected = linear_values(reference), *found = linear_values(test);
     for (size_t i = 0; i < pixel_count(reference); i++)
         errors[i] = pixel_error(expected + i * channels, found + i * channels, channels);
-    free(expected);
-    free(found);
 }
 
 static uint32_t display_step(const Image *image, size_t i)
@@ -135,8 +131,8 @@ static float *display_values(const Image *image)
 static void flip_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
 {
     size_t count = pixel_count(reference);
-    float *expected = display_values(reference), *found = display_values(test);
-    float *map = memory_allocate(count, sizeof *map);
+    OWNED float *expected = display_values(reference), *found = display_values(test),
+                *map = memory_allocate(count, sizeof *map);
     flip_map(expected, found, reference->width, reference->height, map);
     double sum = 0;
     for (size_t i = 0; i < count; i++) {
@@ -144,9 +140,6 @@ static void flip_compare(ImageMetrics *metrics, const Image *reference, const Im
         metrics->flip_max = fmax(metrics->flip_max, (double)map[i]);
     }
     metrics->flip_mean = sum / (double)count;
-    free(expected);
-    free(found);
-    free(map);
 }
 
 static bool is_finite_pixel(const double *values, uint32_t channels)
@@ -160,7 +153,7 @@ static bool is_finite_pixel(const double *values, uint32_t channels)
 static void light_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
 {
     const uint32_t channels = reference->channels;
-    double *expected = linear_values(reference), *found = linear_values(test);
+    OWNED double *expected = linear_values(reference), *found = linear_values(test);
     metrics->linear = error_summarize(expected, found, value_count(reference));
     size_t worst = 0;
     float worst_error = 0;
@@ -176,8 +169,6 @@ static void light_compare(ImageMetrics *metrics, const Image *reference, const I
     }
     metrics->worst_x = (uint32_t)(worst % reference->width);
     metrics->worst_y = (uint32_t)(worst / reference->width);
-    free(expected);
-    free(found);
 }
 
 static bool is_same_number(double a, double b)
@@ -189,9 +180,10 @@ double ulp_distance(double expected, double found, bool is_double)
 {
     if (is_same_number(expected, found)) return 0;
     if (!isfinite(expected) || !isfinite(found)) return INFINITY;
-    const int digits = is_double ? DBL_MANT_DIG : FLT_MANT_DIG, least = is_double ? DBL_MIN_EXP : FLT_MIN_EXP;
+    const int digits = is_double ? DBL_MANT_DIG : FLT_MANT_DIG,
+              exponent_min = is_double ? DBL_MIN_EXP : FLT_MIN_EXP;
     int exponent;
-    if (frexp(expected, &exponent) == 0 || exponent < least) exponent = least;
+    if (frexp(expected, &exponent) == 0 || exponent < exponent_min) exponent = exponent_min;
     return fmin(ldexp(fabs(found - expected), digits - exponent), DBL_MAX);
 }
 

@@ -27,7 +27,7 @@ static NpyType npy_type_of(char name)
 static bool npy_begin(ImageWriter *writer, MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
-    Text text = {0};
+    OwnedText text = {0};
     text_append(&text, "\x93NUMPY\x01\x00\x00\x00", 10);
     text_appendf(&text, "{'descr': '%s', 'fortran_order': False, 'shape': (%u, %u",
                  npy_types[npy_type_of(header->npy_type)].descriptor, header->height, header->width);
@@ -39,9 +39,7 @@ static bool npy_begin(ImageWriter *writer, MessageList *messages)
     size_t length = text.count - 10;
     text.items[8] = (char)(length & 0xFF);
     text.items[9] = (char)(length >> 8);
-    bool done = output_write(&writer->output, text.items, text.count, messages);
-    text_free(&text);
-    return done;
+    return output_write(&writer->output, text.items, text.count, messages);
 }
 
 static bool npy_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
@@ -150,9 +148,6 @@ bool npy_decode(Image *image, const ImageFile *file)
     size_t length = (size_t)bytes[8] | (size_t)bytes[9] << 8;
     if (start == 12) length |= (size_t)bytes[10] << 16 | (size_t)bytes[11] << 24;
     if (length > file->length - start) return image_refuse(file, "NPY: the header is damaged");
-    Text dictionary = {0};
-    text_append(&dictionary, (const char *)bytes + start, length);
-    bool done = npy_dictionary_decode(image, file, text_c(&dictionary), start + length);
-    text_free(&dictionary);
-    return done;
+    OWNED char *dictionary = memory_copy_part((const char *)bytes + start, length);
+    return npy_dictionary_decode(image, file, dictionary, start + length);
 }

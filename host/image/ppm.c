@@ -20,17 +20,15 @@ static bool ppm_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
                      MessageList *messages)
 {
     const size_t size = row_count * display_row_size(&writer->header);
-    uint8_t *bytes = memory_allocate(size, 1);
+    OWNED uint8_t *bytes = memory_allocate(size, 1);
     display_rows(bytes, arrays[0], &writer->header, writer->rows_written, row_count);
-    const bool written = output_write(&writer->output, bytes, size, messages);
-    free(bytes);
-    return written;
+    return output_write(&writer->output, bytes, size, messages);
 }
 
 const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, NULL, NULL};
 
 // Reads the number at `*at` after white space and comments. Returns false unless it is below 2^31.
-static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
+static bool ppm_number_read(const ImageFile *file, size_t *at, uint32_t *number)
 {
     while (*at < file->length && (isspace(file->bytes[*at]) || file->bytes[*at] == '#')) {
         if (file->bytes[*at] == '#') {
@@ -54,8 +52,8 @@ bool ppm_decode(Image *image, const ImageFile *file)
     bool is_text = type == '2' || type == '3';
     size_t at = 2;
     uint32_t width, height, maximum;
-    if (!number_read(file, &at, &width) || !number_read(file, &at, &height) ||
-        !number_read(file, &at, &maximum))
+    if (!ppm_number_read(file, &at, &width) || !ppm_number_read(file, &at, &height) ||
+        !ppm_number_read(file, &at, &maximum))
         return image_refuse(file, "PPM: the header is damaged");
     if (maximum == 0 || maximum > 65535)
         return image_refuse(file, "PPM: the maximum must be 1 to 65535, not %u", maximum);
@@ -72,7 +70,7 @@ bool ppm_decode(Image *image, const ImageFile *file)
     for (size_t i = 0; i < count; i++) {
         uint32_t value;
         if (is_text) {
-            if (!number_read(file, &at, &value))
+            if (!ppm_number_read(file, &at, &value))
                 return image_refuse(file, "PPM: value %zu of %zu is missing or not a number", i + 1, count);
         } else {
             value = file->bytes[at++];

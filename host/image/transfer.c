@@ -12,7 +12,7 @@ typedef struct {
     uint32_t maximum;
     unsigned shift;    // bits of a float below the bucket index
     uint32_t first;    // bucket of thresholds[1]
-    float least;       // in that bucket
+    float bucket_min;  // the least float in that bucket
     float *thresholds; // [k]: the least float that becomes k
     uint16_t *starts;  // [bucket - first]: the display value of the bucket's least float
 } Curve;
@@ -47,8 +47,8 @@ static void curve_prepare(Curve *curve, uint32_t maximum, unsigned bucket_bits)
     // A positive float's upper bits, which order floats, are its bucket: several per power of two.
     curve->shift = 23 - bucket_bits;
     curve->first = float_bits(curve->thresholds[1]) >> curve->shift;
-    const uint32_t least_bits = curve->first << curve->shift;
-    memcpy(&curve->least, &least_bits, sizeof curve->least);
+    const uint32_t bucket_min_bits = curve->first << curve->shift;
+    memcpy(&curve->bucket_min, &bucket_min_bits, sizeof curve->bucket_min);
     uint32_t end = float_bits(1.0F) >> curve->shift;
     curve->starts = memory_allocate(end - curve->first, sizeof *curve->starts);
     uint32_t display = 0;
@@ -110,7 +110,7 @@ static void srgb_quantize_8(uint8_t *bytes, const float *values, size_t count)
     const Curve *curve = curve_of(8);
     const float largest = 0x1.fffffep-1F;
     for (size_t i = 0; i < count; i++) {
-        float value = values[i] > curve->least ? values[i] : curve->least; // also NaN
+        float value = values[i] > curve->bucket_min ? values[i] : curve->bucket_min; // also NaN
         value = value < largest ? value : largest;
         const uint32_t display = curve->starts[(float_bits(value) >> curve->shift) - curve->first];
         bytes[i] = (uint8_t)(display + (value >= curve->thresholds[display + 1]));
