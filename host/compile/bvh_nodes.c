@@ -68,13 +68,12 @@ void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children, because a distant ray may enter the empty slots
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
-    uint32_t *order = order_in_types(bvh);
+    OWNED uint32_t *order = order_in_types(bvh);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
         node_write(&wide.nodes[i], bvh, order, &empty, &node);
     }
-    free(order);
     bvh_wide_free(&wide);
 }
 

@@ -164,7 +164,7 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
         .width = width,
     };
     costs_find(&widening);
-    uint32_t *roots = memory_allocate(bvh->node_count, sizeof *roots);
+    OWNED uint32_t *roots = memory_allocate(bvh->node_count, sizeof *roots);
     *wide = (BvhWide){
         .nodes = memory_allocate_large(bvh->node_count, sizeof *wide->nodes),
         .node_count = 1,
@@ -182,7 +182,6 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
         for (unsigned k = 0; k < node->child_count; k++)
             if (child_is_node(node->children[k])) roots[wide->node_count++] = node->children[k]->first;
     }
-    free(roots);
     free(widening.subtrees);
 }
 

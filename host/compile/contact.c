@@ -1,4 +1,5 @@
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
@@ -45,12 +46,13 @@ static ContactRegion region_of(size_t type, const void *primitive)
 
 typedef struct {
     double low, high;
-} Interval;
+} ContactInterval;
 
-static Interval interval_scale(double low, double high, double factor)
+static ContactInterval interval_scale(double low, double high, double factor)
 {
-    if (factor == 0) return (Interval){0, 0};
-    return factor > 0 ? (Interval){low * factor, high * factor} : (Interval){high * factor, low * factor};
+    if (factor == 0) return (ContactInterval){0, 0};
+    return factor > 0 ? (ContactInterval){low * factor, high * factor}
+                      : (ContactInterval){high * factor, low * factor};
 }
 
 // Returns the part of a box within `margin` of a plane. Along each axis with n_x != 0, it solves n_x x =
@@ -62,10 +64,10 @@ static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double ma
     for (unsigned axis = 0; axis < 3; axis++) {
         if (normal[axis] == 0) continue;
         unsigned next = (axis + 1) % 3, last = (axis + 2) % 3;
-        Interval a = interval_scale(low[next], high[next], normal[next]);
-        Interval b = interval_scale(low[last], high[last], normal[last]);
-        Interval along = interval_scale(flat->offset - margin - a.high - b.high,
-                                        flat->offset + margin - a.low - b.low, 1 / normal[axis]);
+        ContactInterval a = interval_scale(low[next], high[next], normal[next]);
+        ContactInterval b = interval_scale(low[last], high[last], normal[last]);
+        ContactInterval along = interval_scale(flat->offset - margin - a.high - b.high,
+                                               flat->offset + margin - a.low - b.low, 1 / normal[axis]);
         low[axis] = fmax(low[axis], along.low);
         high[axis] = fmin(high[axis], along.high);
         if (low[axis] > high[axis]) return bounds_empty();
@@ -100,7 +102,6 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
 {
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     const FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
-    *list = (ContactRegionList){0};
     double largest = 0;
     for (size_t type = 0; type < TYPE_COUNT; type++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
@@ -177,12 +178,9 @@ static double conditions_largest(const CompiledScene *compiled)
 
 Bounds contact_find(const CompiledScene *compiled)
 {
-    ContactRegionList transparent, opaque;
+    OWNED ContactRegionList transparent = {0}, opaque = {0};
     double coordinate = regions_collect(&transparent, compiled, true);
     coordinate = fmax(coordinate, regions_collect(&opaque, compiled, false));
     const double condition = conditions_largest(compiled);
-    Bounds contact = lists_overlap(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
-    free(transparent.items);
-    free(opaque.items);
-    return contact;
+    return lists_overlap(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
 }

@@ -170,8 +170,8 @@ InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings
     if (!sharing_is_wanted(scene, settings)) return NULL;
     InstancePlan *plan = memory_allocate_zeroed(1, sizeof *plan);
     plan->of_objects = memory_allocate_zeroed(scene->objects.count, sizeof *plan->of_objects);
-    uint32_t *first = memory_allocate_zeroed(scene->meshes.count, sizeof *first),
-             *uses = instance_uses(scene);
+    OWNED uint32_t *first = memory_allocate_zeroed(scene->meshes.count, sizeof *first),
+                   *uses = instance_uses(scene);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (!object_is_instance(object) || object_primitive_count(scene, object) == 0) continue;
@@ -186,8 +186,6 @@ InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings
     }
     for (size_t i = 0; i < plan->mesh_count; i++)
         shared_mesh_classify(scene, &plan->meshes[i]);
-    free(first);
-    free(uses);
     if (plan->instance_count > 0) return plan;
     instance_plan_free(plan);
     return NULL;

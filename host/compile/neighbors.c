@@ -20,7 +20,7 @@ typedef struct {
     TriangleNeighbors *neighbors;
 } Triangles;
 
-static MeshTriangle triangle_of(const Scene *scene, const Object *object, size_t part)
+static MeshTriangle object_triangle(const Scene *scene, const Object *object, size_t part)
 {
     if (object->type == SHAPE_MESH)
         return mesh_triangle_at(&scene->meshes.items[object->as.mesh.index], object, part);
@@ -37,7 +37,7 @@ static void separate_triangles_add(Triangles *triangles, const Object *object, u
     Mesh *all = &triangles->all;
     const size_t count = object_primitive_count(triangles->scene, object);
     for (size_t i = 0; i < count; i++, all->triangle_count++) {
-        const MeshTriangle placed = triangle_of(triangles->scene, object, i);
+        const MeshTriangle placed = object_triangle(triangles->scene, object, i);
         triangles->ids[all->triangle_count] = first_id + (uint32_t)i;
         for (int k = 0; k < 3; k++) {
             all->triangles[all->triangle_count][k] = (uint32_t)all->vertex_count;
@@ -47,7 +47,7 @@ static void separate_triangles_add(Triangles *triangles, const Object *object, u
 }
 
 // Appends the vertices and triangles of a mesh that is not an instance.
-static void mesh_add(Triangles *triangles, const Mesh *mesh, uint32_t first_id)
+static void mesh_triangles_add(Triangles *triangles, const Mesh *mesh, uint32_t first_id)
 {
     Mesh *all = &triangles->all;
     memcpy(all->vertices + all->vertex_count, mesh->vertices, mesh->vertex_count * sizeof *mesh->vertices);
@@ -85,7 +85,7 @@ static Triangles triangles_open(const Scene *scene)
         const size_t first = triangles.all.triangle_count;
         triangles.first_ids[i] = id;
         if (mesh && !object->as.mesh.is_instance)
-            mesh_add(&triangles, mesh, id);
+            mesh_triangles_add(&triangles, mesh, id);
         else if (mesh || object->type == SHAPE_TRIANGLE)
             separate_triangles_add(&triangles, object, id);
         for (size_t k = first; k < triangles.all.triangle_count; k++)
@@ -127,8 +127,8 @@ static int compare_high(const void *one, const void *other)
 static void edges_match(Triangles *triangles)
 {
     const size_t count = 3 * triangles->all.triangle_count;
-    Edge *edges = memory_allocate(count, sizeof *edges);
-    uint32_t *ends =
+    OWNED Edge *edges = memory_allocate(count, sizeof *edges);
+    OWNED uint32_t *ends =
         memory_allocate_zeroed(triangles->all.vertex_count + 1, sizeof *ends); // by the lower point
     triangles->across = memory_allocate(count, sizeof *triangles->across);
     memset(triangles->across, 0xff, count * sizeof *triangles->across);
@@ -154,8 +154,6 @@ static void edges_match(Triangles *triangles)
             i = next;
         }
     }
-    free(edges);
-    free(ends);
 }
 
 typedef enum { BEHIND = -1, WITHIN, IN_FRONT, UNKNOWN } Side;
@@ -195,8 +193,8 @@ static Side side_of(const Triangles *triangles, const uint32_t *corners, uint32_
 static MeshTriangle triangle_at(const Triangles *triangles, size_t index)
 {
     const uint32_t owner = triangles->owners[index];
-    return triangle_of(triangles->scene, &triangles->scene->objects.items[owner],
-                       triangles->ids[index] - triangles->first_ids[owner]);
+    return object_triangle(triangles->scene, &triangles->scene->objects.items[owner],
+                           triangles->ids[index] - triangles->first_ids[owner]);
 }
 
 // Returns whether triangle_lift (kernels/shapes/triangle_normals.h) moves points of the neighbor, seen from

@@ -132,7 +132,7 @@ static void range_move_attributes(const FlatteningRange *range, size_t first_nor
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
     Flattening all = {.compiled = compiled, .scene = scene, .rounding = *rounding};
-    FlatteningRanges ranges = {0};
+    OWNED FlatteningRanges ranges = {0};
     for (size_t i = 0; i < scene->objects.count; i++)
         object_divide(&ranges, &all, i);
     arrays_make(compiled, &all);
@@ -148,7 +148,6 @@ void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding
     }
     compiled->arrays[FLAT_TRIANGLE_NORMALS].count = normals_count;
     compiled->arrays[FLAT_TRIANGLE_UVS].count = uvs_count;
-    free(ranges.items);
 }
 
 typedef struct {
@@ -191,7 +190,7 @@ static void range_move(void *context, size_t begin, size_t end)
 
 void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
-    uint32_t *first_ids = memory_allocate(scene->objects.count + 1, sizeof *first_ids);
+    OWNED uint32_t *first_ids = memory_allocate(scene->objects.count + 1, sizeof *first_ids);
     first_ids[0] = 0;
     for (size_t i = 0; i < scene->objects.count; i++)
         first_ids[i + 1] = first_ids[i] + (uint32_t)object_primitive_count(scene, &scene->objects.items[i]);
@@ -202,6 +201,5 @@ void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *r
         compiled->changed[FLAT_FIRST_SHAPE + type] = true;
         parallel_run(move.array->count, FLAT_RANGE_MIN, range_move, &move);
     }
-    free(first_ids);
     compiled->features = (compiled->features & ~(FeatureSet)FEATURE_EYE_POWERS) | move.features;
 }

@@ -123,7 +123,7 @@ void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const Com
 {
     InstancePlan *plan = compiled->instances;
     if (!plan) return;
-    CompiledScene *parts = memory_allocate(plan->mesh_count, sizeof *parts);
+    OWNED CompiledScene *parts = memory_allocate(plan->mesh_count, sizeof *parts);
     for (size_t i = 0; i < plan->mesh_count; i++)
         parts[i] =
             shared_mesh_compile(compiled, scene, &plan->meshes[i], settings, &compiled->primitives_hash);
@@ -141,7 +141,6 @@ void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const Com
             compiled->pending_children_max = parts[i].pending_children_max;
         compiled_scene_free(&parts[i]);
     }
-    free(parts);
     const FlatArray *ids = &compiled->arrays[FLAT_INSTANCE_IDS];
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < ids->count; i++) {

@@ -139,7 +139,7 @@ static Sky sky_open(double elevation, double turbidity)
 
 // Converts a luminance in kcd/m^2 and a chromaticity to linear sRGB (IEC 61966-2-1). Where the model leaves
 // its gamut, next to a low sun, blue is 0.
-static void texel_set(float *texel, double luminance, double x, double y)
+static void texel_convert(float *texel, double luminance, double x, double y)
 {
     const double big_y = luminance * (M_PI / 100), big_x = big_y * x / y, big_z = big_y * (1 - x - y) / y;
     texel[0] = (float)fmax(3.2406 * big_x - 1.5372 * big_y - 0.4986 * big_z, 0);
@@ -165,7 +165,7 @@ static void rows_fill(void *context, size_t begin, size_t end)
                 color[i] = row[i] * perez_of_angle(&sky->perez[i], angle, cosine);
             float *right = sky->values + 3 * (y * IMAGE_WIDTH + IMAGE_WIDTH / 2 + x);
             float *left = sky->values + 3 * (y * IMAGE_WIDTH + IMAGE_WIDTH / 2 - 1 - x);
-            texel_set(right, sky->fading * color[0], color[1], color[2]);
+            texel_convert(right, sky->fading * color[0], color[1], color[2]);
             for (size_t i = 0; i < 3; i++)
                 left[i] = right[i];
         }

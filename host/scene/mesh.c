@@ -63,7 +63,7 @@ static size_t vertices_join(Mesh *mesh, uint32_t *joined)
     size_t slot_count = 16;
     while (slot_count < 2 * mesh->vertex_count)
         slot_count *= 2;
-    uint32_t *slots = memory_allocate(slot_count, sizeof *slots);
+    OWNED uint32_t *slots = memory_allocate(slot_count, sizeof *slots);
     memset(slots, 0xff, slot_count * sizeof *slots);
     size_t kept = 0;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
@@ -77,14 +77,13 @@ static size_t vertices_join(Mesh *mesh, uint32_t *joined)
         }
         joined[i] = slots[slot];
     }
-    free(slots);
     return kept;
 }
 
 void mesh_join_vertices(Mesh *mesh)
 {
     if (mesh->vertex_count == 0) return;
-    uint32_t *joined = memory_allocate(mesh->vertex_count, sizeof *joined);
+    OWNED uint32_t *joined = memory_allocate(mesh->vertex_count, sizeof *joined);
     memset(joined, 0xff, mesh->vertex_count * sizeof *joined);
     for (size_t i = 0; i < mesh->triangle_count; i++)
         for (int corner = 0; corner < 3; corner++)
@@ -93,7 +92,6 @@ void mesh_join_vertices(Mesh *mesh)
     for (size_t i = 0; i < mesh->triangle_count; i++)
         for (int corner = 0; corner < 3; corner++)
             mesh->triangles[i][corner] = joined[mesh->triangles[i][corner]];
-    free(joined);
     mesh->vertices = memory_resize(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
     if (mesh->normals)
         mesh->normals = memory_resize(mesh->normals, mesh->vertex_count, sizeof *mesh->normals);

@@ -244,20 +244,21 @@ static void ring_remove_spikes(Ring *ring)
     }
 }
 
-static void ring_open(Ring *ring, const Vector3 *corners, size_t count, Vector3 normal)
+static Ring ring_open(const Vector3 *corners, size_t count, Vector3 normal)
 {
-    *ring = (Ring){
-        .points = memory_allocate(count, sizeof *ring->points),
-        .next = memory_allocate(count, sizeof *ring->next),
-        .previous = memory_allocate(count, sizeof *ring->previous),
-        .is_ear = memory_allocate(count, sizeof *ring->is_ear),
+    Ring ring = {
+        .points = memory_allocate(count, sizeof *ring.points),
+        .next = memory_allocate(count, sizeof *ring.next),
+        .previous = memory_allocate(count, sizeof *ring.previous),
+        .is_ear = memory_allocate(count, sizeof *ring.is_ear),
         .count = count,
     };
-    project_to_plane(ring->points, corners, count, normal);
+    project_to_plane(ring.points, corners, count, normal);
     for (size_t i = 0; i < count; i++) {
-        ring->next[i] = (uint32_t)((i + 1) % count);
-        ring->previous[i] = (uint32_t)((i + count - 1) % count);
+        ring.next[i] = (uint32_t)((i + 1) % count);
+        ring.previous[i] = (uint32_t)((i + count - 1) % count);
     }
+    return ring;
 }
 
 static void ring_close(Ring *ring)
@@ -305,9 +306,6 @@ PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonT
         return POLYGON_CUT;
     }
     if (vector_is_zero(normal)) return POLYGON_WITHOUT_AREA;
-    Ring ring;
-    ring_open(&ring, corners, count, normal);
-    PolygonStatus status = ring_cut(&ring, triangles);
-    ring_close(&ring);
-    return status;
+    __attribute__((cleanup(ring_close))) Ring ring = ring_open(corners, count, normal);
+    return ring_cut(&ring, triangles);
 }

@@ -59,7 +59,7 @@ static Color blended_color(const Scene *scene, double sine)
     return vector_add(vector_scale(scene->background, 1 - fabs(sine)), vector_scale(pole, fabs(sine)));
 }
 
-static Color texel_color(const Image *image, uint32_t x, uint32_t y)
+static Color sky_texel(const Image *image, uint32_t x, uint32_t y)
 {
     float color[3];
     image_light(image, (size_t)y * image->width + x, image->display, color);
@@ -73,7 +73,7 @@ Color sky_mean(const Scene *scene)
     for (uint32_t y = 0; y < sky.height; y++) {
         const SkyRow row = sky_row(&sky, y, y, y + 1.0);
         for (uint32_t x = 0; x < sky.width; x++)
-            sum = vector_add(sum, vector_scale(texel_color(sky.image, x, y), row.solid_angle));
+            sum = vector_add(sum, vector_scale(sky_texel(sky.image, x, y), row.solid_angle));
     }
     return vector_scale(sum, scene->sky.intensity / (4 * M_PI));
 }
@@ -81,7 +81,7 @@ Color sky_mean(const Scene *scene)
 // Returns the largest channel in a part of a row.
 static double brightest(const SkyImage *sky, const SkyRow *row, uint32_t x)
 {
-    if (sky->image) return vector_largest(texel_color(sky->image, x, row->y));
+    if (sky->image) return vector_largest(sky_texel(sky->image, x, row->y));
     return fmax(vector_largest(blended_color(sky->scene, row->highest)),
                 vector_largest(blended_color(sky->scene, row->lowest)));
 }
@@ -144,31 +144,30 @@ static void line_divide(const double *light, size_t length, double *edges, size_
 static double cells_set(SkyCell *cells, const SkyImage *sky, const SkyRow *row, const double *light,
                         const double *brightness)
 {
-    double edges[SKY_CELL_COLUMNS + 1], most = 0;
+    double edges[SKY_CELL_COLUMNS + 1], largest = 0;
     line_divide(light, sky->width, edges, SKY_CELL_COLUMNS);
     for (size_t i = 0; i < SKY_CELL_COLUMNS; i++) {
         cells[i] = (SkyCell){edges[i] / sky->width - 0.5, edges[i + 1] / sky->width - 0.5, row->lowest,
                              row->highest};
         const double solid_angle = row->solid_angle * (edges[i + 1] - edges[i]);
         for (size_t x = (size_t)edges[i]; (double)x < edges[i + 1]; x++)
-            most = fmax(most, solid_angle * brightness[x]);
+            largest = fmax(largest, solid_angle * brightness[x]);
     }
-    return most;
+    return largest;
 }
 
 void scene_add_sky_light(Scene *scene)
 {
     const SkyImage sky = sky_image(scene);
-    double *rows = memory_allocate(sky.height, sizeof *rows),
-           *light = memory_allocate_zeroed(sky.width, sizeof *light),
-           *brightness = memory_allocate_zeroed(sky.width, sizeof *brightness), edges[SKY_CELL_ROWS + 1],
-           most = 0;
+    OWNED double *rows = memory_allocate(sky.height, sizeof *rows),
+                 *light = memory_allocate_zeroed(sky.width, sizeof *light),
+                 *brightness = memory_allocate_zeroed(sky.width, sizeof *brightness);
+    double edges[SKY_CELL_ROWS + 1], largest = 0;
     for (uint32_t y = 0; y < sky.height; y++) {
         const SkyRow row = sky_row(&sky, y, y, y + 1.0);
         rows[y] = row_add(&sky, &row, light, brightness);
     }
     line_divide(rows, sky.height, edges, SKY_CELL_ROWS);
-    free(rows);
     scene->sky.cells = memory_allocate(SKY_CELL_ROWS * SKY_CELL_COLUMNS, sizeof *scene->sky.cells);
     for (size_t i = 0; i < SKY_CELL_ROWS; i++) {
         for (uint32_t x = 0; x < sky.width; x++)
@@ -178,19 +177,17 @@ void scene_add_sky_light(Scene *scene)
             row_add(&sky, &row, light, brightness);
         }
         const SkyRow cells_row = sky_row(&sky, 0, edges[i], edges[i + 1]);
-        most = fmax(most,
-                    cells_set(scene->sky.cells + i * SKY_CELL_COLUMNS, &sky, &cells_row, light, brightness));
+        largest = fmax(
+            largest, cells_set(scene->sky.cells + i * SKY_CELL_COLUMNS, &sky, &cells_row, light, brightness));
     }
-    free(light);
-    free(brightness);
     const double cell_count = SKY_CELL_ROWS * SKY_CELL_COLUMNS,
                  intensity = sky.image ? scene->sky.intensity : 1;
-    if (most * intensity < faint_light) return;
+    if (largest * intensity < faint_light) return;
     // scaled so that a white surface that sees all of a uniform sky has the sky's color
     const Light sky_light = {.type = LIGHT_DIRECTIONAL,
                              .area.type = AREA_SKY,
-                             .color = vector_all(most * cell_count * intensity / M_PI),
+                             .color = vector_all(largest * cell_count * intensity / M_PI),
                              .direction = vector_scale(scene->sky.up, -1)};
-    scene->sky.cell_factor = 2 * M_PI / most;
+    scene->sky.cell_factor = 2 * M_PI / largest;
     array_push(scene->lights, sky_light);
 }
