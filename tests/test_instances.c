@@ -410,14 +410,15 @@ TEST(too_many_are_refused)
     object_repeat(&scene, (1 << 24) / TRIANGLES);
     CompileSettings settings = plain_settings;
     settings.certifies = true;
-    check_message(
-        &scene, &settings,
-        "error: unshared instances have 16777728 triangles in total; at most 16777216 are allowed: precision "
-        "certified shares no meshes, other precisions none that a transform stretches unevenly\n");
+    check_message(&scene, &settings,
+                  "error: copies of meshes have 16777728 triangles in total; at most 16777216 are allowed; "
+                  "precision certified copies the mesh of each instance\n");
     object_repeat(&scene, (INT32_MAX - 1) / TRIANGLES - scene.objects.count + 2);
     settings.certifies = false;
-    check_message(&scene, &settings,
-                  "error: the scene has 2147484673 objects and triangles with IDs, more than 2147483646\n");
+    check_message(
+        &scene, &settings,
+        "error: the scene has 2147484673 objects and triangles, those of all instances included; at "
+        "most 2147483646 are supported\n");
 }
 
 // Counts only: the mesh does not have these triangles.
@@ -429,9 +430,9 @@ TEST(one_instance_of_a_large_mesh_is_not_a_copy)
     const CompiledScene compiled = {0};
     OwnedMessageList messages = {0};
     mesh->triangle_count = (1 << 24) + 1;
-    assert_true(size_fits(&compiled, &scene, &messages));
+    assert_true(size_fits(&compiled, &scene, &plain_settings, &messages));
     object_repeat(&scene, 1);
-    assert_false(size_fits(&compiled, &scene, &messages));
+    assert_false(size_fits(&compiled, &scene, &plain_settings, &messages));
     mesh->triangle_count = count;
 }
 

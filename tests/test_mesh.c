@@ -303,7 +303,8 @@ TEST(too_many_triangles_are_refused)
     Mesh mesh = {.triangle_count = ((size_t)1 << 28) + 1};
     Object object = {.type = SHAPE_MESH};
     Scene scene = {.meshes = {&mesh, 1, 1}, .objects = {&object, 1, 1}};
-    assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
+    assert_refused(&probe_compute, &scene,
+                   "268435457 objects and triangles; at most 268435456 are supported");
 }
 
 // The first mesh of a file is not a copy. The third, of two triangles, is one too many, whatever its name.

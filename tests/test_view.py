@@ -144,7 +144,7 @@ class View(TestCase):
         window = Window(self)
         window.check()
         write("scene.yaml", SCENE.replace("[3, 4, -5]", "[1e25, 4, -5]"))
-        window.line("a light lies 1e.25 from the eye")
+        window.line("a light is 1e.25 from the eye")
         window.check()
         window.key("Left")
         window.check()

@@ -37,7 +37,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const SceneE
                        const CompileSettings *settings, MessageList *messages)
 {
     compiled->instances = instances_plan(scene, settings);
-    if (!size_fits(compiled, scene, messages) || !features_fit(scene, settings, messages) ||
+    if (!size_fits(compiled, scene, settings, messages) || !features_fit(scene, settings, messages) ||
         !lights_fit(compiled, scene, extent, settings, messages))
         return false;
     textures_flatten(compiled, scene, settings);
@@ -72,10 +72,9 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
     const SceneExtent extent = scene_extent(scene);
     sizes_check(scene, &extent, settings, messages);
     *compiled = (CompiledScene){.unit = scene_unit(scene, &extent, settings)};
-    Scene scaled = {0};
+    __attribute__((cleanup(scene_scaled_free))) Scene scaled = {0};
     if (compiled->unit != 1) scaled = scene_scaled(scene, 1 / compiled->unit);
     bool done = stages_run(compiled, compiled->unit != 1 ? &scaled : scene, &extent, settings, messages);
-    scene_scaled_free(&scaled);
     if (!done) compiled_scene_free(compiled);
     compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;
     return done;

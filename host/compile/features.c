@@ -54,15 +54,6 @@ typedef struct {
     _Atomic FeatureSet set;
 } ObjectFeatures;
 
-static void range_find_materials(void *context, size_t begin, size_t end)
-{
-    ObjectFeatures *features = context;
-    FeatureSet set = 0;
-    for (size_t i = begin; i < end; i++)
-        set |= features->of_materials[features->scene->objects.items[i].material];
-    atomic_fetch_or(&features->set, set);
-}
-
 static void range_find_features(void *context, size_t begin, size_t end)
 {
     ObjectFeatures *features = context;
@@ -83,7 +74,7 @@ static FeatureSet meshes_materials(const ObjectFeatures *features)
     const Scene *scene = features->scene;
     FeatureSet set = 0;
     if (scene->meshes.count == 0) return set;
-    bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
+    OWNED bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object->type != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
@@ -93,32 +84,17 @@ static FeatureSet meshes_materials(const ObjectFeatures *features)
         for (size_t k = 0; materials && k < mesh->triangle_count; k++)
             set |= features->of_materials[materials[k]];
     }
-    free(is_done);
     return set;
-}
-
-// Returns the union of what `of` returns for the used materials and of what `find` adds for objects.
-static FeatureSet objects_union(const Scene *scene, FeatureSet (*of)(const Material *material),
-                                void (*find)(void *features, size_t begin, size_t end))
-{
-    FeatureSet *of_materials = memory_allocate(scene->materials.count, sizeof *of_materials);
-    for (size_t i = 0; i < scene->materials.count; i++)
-        of_materials[i] = of(&scene->materials.items[i]);
-    ObjectFeatures features = {scene, of_materials, 0};
-    parallel_run(scene->objects.count, FLAT_RANGE_MIN, find, &features);
-    const FeatureSet set = features.set | meshes_materials(&features);
-    free(of_materials);
-    return set;
-}
-
-FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
-{
-    return objects_union(scene, of, range_find_materials);
 }
 
 FeatureSet features_of(const Scene *scene)
 {
-    FeatureSet set = objects_union(scene, material_features, range_find_features);
+    OWNED FeatureSet *of_materials = memory_allocate(scene->materials.count, sizeof *of_materials);
+    for (size_t i = 0; i < scene->materials.count; i++)
+        of_materials[i] = material_features(&scene->materials.items[i]);
+    ObjectFeatures features = {scene, of_materials, 0};
+    parallel_run(scene->objects.count, FLAT_RANGE_MIN, range_find_features, &features);
+    FeatureSet set = features.set | meshes_materials(&features);
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         set |= light_features[light->type];

@@ -23,7 +23,4 @@ typedef uint64_t FeatureSet;
 extern const char *const feature_names[FEATURE_COUNT]; // "SPHERES", …
 
 FeatureSet features_of(const Scene *scene);
-
-// Returns the union of a set for each material that an object has.
-FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material));
 void features_write_prelude(Text *text, FeatureSet set); // `#define HAS_SPHERES 1` … one for each feature

@@ -5,37 +5,41 @@
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
+#include "host/scene/describe.h"
 #include <float.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
-bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages)
+bool size_fits(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+               MessageList *messages)
 {
-    const size_t id_max = INT32_MAX - 1, largest = (size_t)1 << 28; // bits that the BVH counts with
-    const size_t unshared_max = (size_t)1 << 24;                    // bounds the cost of a hostile file
+    const size_t id_max = INT32_MAX - 1;
+    const size_t bvh_max = (size_t)1 << 28;    // the most primitives that bvh_build accepts
+    const size_t copied_max = (size_t)1 << 24; // bounds the cost of a hostile file
     const InstancePlan *plan = compiled->instances;
     const size_t count = scene_primitive_count(scene), single = count - (plan ? plan->triangle_count : 0);
     if (count > id_max)
-        return message_error(messages, "the scene has %zu objects and triangles with IDs, more than %zu",
+        return message_error(messages,
+                             "the scene has %zu objects and triangles, those of all instances included; at "
+                             "most %zu are supported",
                              count, id_max);
-    if (single > largest)
-        return message_error(messages, "the scene has %zu objects and triangles, more than %zu", single,
-                             largest);
+    if (single > bvh_max)
+        return message_error(messages, "the scene has %zu objects and triangles; at most %zu are supported",
+                             single, bvh_max);
     if (scene->meshes.count == 0) return true;
-    size_t unshared = 0;
-    uint32_t *uses = instance_uses(scene);
+    size_t copied = 0;
+    OWNED uint32_t *uses = instance_uses(scene);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         if (object_is_instance(object) && uses[object->as.mesh.index] > 1 && instance_mesh(compiled, i) == 0)
-            unshared += object_primitive_count(scene, object);
+            copied += object_primitive_count(scene, object);
     }
-    free(uses);
-    if (unshared <= unshared_max) return true;
-    return message_error(
-        messages,
-        "unshared instances have %zu triangles in total; at most %zu are allowed: precision certified shares "
-        "no meshes, other precisions none that a transform stretches unevenly",
-        unshared, unshared_max);
+    if (copied <= copied_max) return true;
+    return message_error(messages,
+                         "copies of meshes have %zu triangles in total; at most %zu are allowed; %s", copied,
+                         copied_max,
+                         settings->certifies ? "precision certified copies the mesh of each instance"
+                                             : "a mesh is copied if a transform stretches it unevenly");
 }
 
 typedef struct {
@@ -77,19 +81,23 @@ void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSet
         if (reach > farthest.size) farthest = (Extreme){object, reach};
         if (width > 0 && width < smallest.size) smallest = (Extreme){object, width};
     }
-    char *names[] = {extreme_describe(scene, &farthest), extreme_describe(scene, &smallest)};
+    OWNED char *farthest_name = extreme_describe(scene, &farthest),
+               *smallest_name = extreme_describe(scene, &smallest);
     message_warning(
         messages,
         "the %s reaches %.3g from the eye, and the width of the %s is %.3g: precision %s may lose "
-        "details below a trillionth; change the sizes, or use --precision double",
-        names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
-    free(names[0]);
-    free(names[1]);
+        "details smaller than a trillionth of the scene; change the sizes, or use --precision double",
+        farthest_name, farthest.size, smallest_name, smallest.size, precision_names[settings->precision]);
 }
 
-static FeatureSet material_shadow(const Material *material)
+static bool material_is_used(const Scene *scene, uint32_t material)
 {
-    return material->shadow == SHADOW_NONE;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        for (size_t k = 0; k < object_primitive_count(scene, object); k++)
+            if (object_material(scene, object, k) == material) return true;
+    }
+    return false;
 }
 
 bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
@@ -122,9 +130,10 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
             "'shift' moves the middle of the frame to %.3g focal lengths from the eye, where "
             "certified has error bounds up to %.3g: choose another precision",
             vector_length(basis.middle), (double)CAMERA_DIRECTION_ERROR_MAX / CAMERA_SHIFT_ERROR - 1);
-    if (settings->certifies && materials_union(scene, material_shadow))
-        return message_error(messages, "a material has 'shadow: false', which has no error bound: choose a "
-                                       "precision other than certified");
+    for (uint32_t i = 0; i < scene->materials.count && settings->certifies; i++)
+        if (scene->materials.items[i].shadow == SHADOW_NONE && material_is_used(scene, i))
+            return message_error(messages, "a material has 'shadow: false', which has no error bound: choose "
+                                           "a precision other than certified");
     return true;
 }
 
@@ -141,9 +150,9 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const SceneEx
         if (light->type == LIGHT_DIRECTIONAL || distance <= farthest) continue;
         return message_error(
             messages,
-            "a light lies %.3g from the eye, farther than precision %s can square (%.3g): use a "
-            "directional light or --precision double",
-            distance * compiled->unit, precision_names[settings->precision], farthest * compiled->unit);
+            "a light is %.3g from the eye, but at most %.3g is possible at precision %s; use a directional "
+            "light or --precision double",
+            distance * compiled->unit, farthest * compiled->unit, precision_names[settings->precision]);
     }
     return true;
 }

@@ -7,7 +7,8 @@
 
 // limits.c: Returns false with a message if the scene has more primitives than ids, more unshared ones than
 // a BVH counts, or more copies than instances may have.
-bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages);
+bool size_fits(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+               MessageList *messages);
 
 // limits.c: Warns of a scene whose sizes differ by more than a trillion, if the precision is in float.
 void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings,
