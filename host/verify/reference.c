@@ -1,5 +1,6 @@
 #include "host/verify/reference.h"
 #include "host/compile/compiled_scene.h"
+#include "host/scene/shape_members.h"
 #include "host/verify/reference_shape.h"
 #include <math.h>
 
@@ -69,9 +70,9 @@ Object reference_round_object(const Object *object)
 Object reference_object_from(const Object *object, Vector3 eye)
 {
     Object result = *object;
-    Vector3 *points = (Vector3 *)(void *)&result.as;
-    for (unsigned i = 0; i < reference_shapes[object->type]->point_count; i++)
-        points[i] = vector_subtract(points[i], eye);
+    const ShapeMembers members = shape_members(&result);
+    for (Vector3 *const *point = members.points; *point; point++)
+        **point = vector_subtract(**point, eye);
     return result;
 }
 

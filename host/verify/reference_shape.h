@@ -8,8 +8,8 @@ typedef struct {
     void (*hit)(const Object *object, const ReferenceRay *ray, ReferenceHit *hit);
     // Measures the surface and adds its sheets.
     void (*surface)(const Object *object, Quad3 point, ReferenceSurface *surface);
-    // The layout of the shape's members in Object: consecutive doubles, points first, then flags.
-    unsigned point_count, number_count;
+    // The shape's members in Object begin with this many doubles, after which only flags follow.
+    unsigned number_count;
 } ReferenceShape;
 
 // Indexed by ShapeType, which follows SHAPE_LIST. A mesh is tested as its triangles.

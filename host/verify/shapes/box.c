@@ -48,7 +48,7 @@ static void surface_box(const Object *object, Quad3 point, ReferenceSurface *sur
     }
 }
 
-const ReferenceShape reference_box = {hit_box, surface_box, 2, 6};
+const ReferenceShape reference_box = {hit_box, surface_box, 6};
 
 static void box_randomize(RandomShape *made, unsigned form, Random *random)
 {

@@ -34,7 +34,7 @@ static void surface_disc(const Object *object, Quad3 point, ReferenceSurface *su
     surface_add(surface, quad_hypotenuse(height, quad_outside(off, 0, radius)), normal, UNBOUNDED);
 }
 
-const ReferenceShape reference_disc = {hit_disc, surface_disc, 1, 7};
+const ReferenceShape reference_disc = {hit_disc, surface_disc, 7};
 
 static void disc_randomize(RandomShape *made, unsigned form, Random *random)
 {

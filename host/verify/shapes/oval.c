@@ -73,7 +73,7 @@ static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *su
     }
 }
 
-const ReferenceShape reference_oval = {hit_oval, surface_oval, 1, 16};
+const ReferenceShape reference_oval = {hit_oval, surface_oval, 16};
 
 // Lacks random shapes; tests/test_ovals.c transforms others.
 const RandomForms oval_forms = {{NULL}, NULL};

@@ -57,7 +57,7 @@ static void surface_paraboloid(const Object *object, Quad3 point, ReferenceSurfa
         surface_add(surface, quad_hypotenuse(z - height, quad_outside(off, 0, rim)), axis, UNBOUNDED);
 }
 
-const ReferenceShape reference_paraboloid = {hit_paraboloid, surface_paraboloid, 1, 8};
+const ReferenceShape reference_paraboloid = {hit_paraboloid, surface_paraboloid, 8};
 
 enum { PARABOLOID_CAPPED, PARABOLOID_OPEN, PARABOLOID_INFINITE };
 

@@ -21,7 +21,7 @@ static void surface_plane(const Object *object, Quad3 point, ReferenceSurface *s
     surface_add(surface, height, normal, UNBOUNDED);
 }
 
-const ReferenceShape reference_plane = {hit_plane, surface_plane, 1, 6};
+const ReferenceShape reference_plane = {hit_plane, surface_plane, 6};
 
 static void plane_randomize(RandomShape *made, unsigned form, Random *random)
 {

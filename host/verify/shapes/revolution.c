@@ -125,9 +125,9 @@ static void surface_revolution(const Object *object, Quad3 point, ReferenceSurfa
                 UNBOUNDED);
 }
 
-const ReferenceShape reference_cylinder = {hit_revolution, surface_revolution, 1, 7};
+const ReferenceShape reference_cylinder = {hit_revolution, surface_revolution, 7};
 
-const ReferenceShape reference_cone = {hit_revolution, surface_revolution, 1, 9};
+const ReferenceShape reference_cone = {hit_revolution, surface_revolution, 9};
 
 // Chooses a random axis and the two radii at its ends. Returns where the axis starts.
 static Vector3 random_axis(RandomShape *made, double radii[2], Random *random)

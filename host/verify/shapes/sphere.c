@@ -28,7 +28,7 @@ static void surface_sphere(const Object *object, Quad3 point, ReferenceSurface *
     surface_add(surface, distance - radius, quad3_scale(from_center, 1 / distance), radius);
 }
 
-const ReferenceShape reference_sphere = {hit_sphere, surface_sphere, 1, 4};
+const ReferenceShape reference_sphere = {hit_sphere, surface_sphere, 4};
 
 static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
 {

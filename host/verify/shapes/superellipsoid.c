@@ -159,7 +159,7 @@ static void surface_superellipsoid(const Object *object, Quad3 point, ReferenceS
     surface_add(surface, (at.gauge - 1) * at.reach, at.normal, at.curvature_radius);
 }
 
-const ReferenceShape reference_superellipsoid = {hit_superellipsoid, surface_superellipsoid, 1, 13};
+const ReferenceShape reference_superellipsoid = {hit_superellipsoid, surface_superellipsoid, 13};
 
 enum { SUPERELLIPSOID_ALIGNED, SUPERELLIPSOID_TURNED };
 

@@ -128,7 +128,7 @@ static void surface_torus(const Object *object, Quad3 point, ReferenceSurface *s
     surface_add(surface, distance - minor, quad3_scale(from_circle, 1 / distance), minor);
 }
 
-const ReferenceShape reference_torus = {hit_torus, surface_torus, 1, 8};
+const ReferenceShape reference_torus = {hit_torus, surface_torus, 8};
 
 enum { TORUS, TORUS_THIN, TORUS_FAT, TORUS_SPINDLE };
 

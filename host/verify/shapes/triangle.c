@@ -79,7 +79,7 @@ static void surface_triangle(const Object *object, Quad3 point, ReferenceSurface
     surface_add(surface, quad3_dot(quad3_subtract(point, a), normal), normal, UNBOUNDED);
 }
 
-const ReferenceShape reference_triangle = {hit_triangle, surface_triangle, 3, 18};
+const ReferenceShape reference_triangle = {hit_triangle, surface_triangle, 18};
 
 enum { TRIANGLE_FLAT, TRIANGLE_SMOOTH };
 
