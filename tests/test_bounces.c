@@ -136,6 +136,11 @@ static double largest_difference(Color a, Color b)
     return error_max(fabs(a.x - b.x), error_max(fabs(a.y - b.y), fabs(a.z - b.z)));
 }
 
+static Color path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
+{
+    return reference_pixel(&(ReferenceScene){*scene, NULL}, ray, path, NULL).color;
+}
+
 // Returns how far the pixel's color moves if its rays move.
 static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Trial *trial, double u,
                           Color color)
@@ -143,7 +148,7 @@ static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Tri
     double largest = 0;
     for (uint64_t seed = 1; seed <= BLURRED_COUNT; seed++) {
         const ReferencePath path = {.bounce_count = trial->bounce_count, .blur = BLUR * u, .seed = seed};
-        largest = error_max(largest, largest_difference(reference_path_color(scene, ray, &path), color));
+        largest = error_max(largest, largest_difference(path_color(scene, ray, &path), color));
     }
     return largest;
 }
@@ -183,7 +188,7 @@ static void shows_what_the_reference_shows(void **state)
     const ReferencePath path = {.bounce_count = trial->bounce_count};
     for (unsigned i = 0; i < width * height; i++) {
         ReferenceRay ray = reference_camera_ray(&scene.camera, width, height, i % width, i / width);
-        expected[i] = reference_path_color(&scene, &ray, &path);
+        expected[i] = path_color(&scene, &ray, &path);
     }
     for (Precision precision = PRECISION_SINGLE; precision < ARITHMETIC_COUNT; precision++)
         compare(trial, &scene, expected, precision);

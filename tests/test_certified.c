@@ -9,6 +9,7 @@
 #include "host/scene/object_transform.h"
 #include "host/verify/verify.h"
 #include "tests/certified.h"
+#include "tests/reference.h"
 
 enum { WIDTH = 48, HEIGHT = 36 };
 

@@ -5,10 +5,10 @@
 #include "host/compile/compile.h"
 #include "host/scene/object_transform.h"
 #include "host/scene/oval.h"
-#include "host/verify/reference.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
+#include "tests/reference.h"
 
 enum { RAYS = 2000 };
 

@@ -2,9 +2,9 @@
 #include "host/base/ulp.h"
 #include "host/compile/camera_basis.h"
 #include "host/verify/certify.h"
-#include "host/verify/reference_color.h"
 #include "tests/check.h"
 #include "tests/random_ray.h"
+#include "tests/reference.h"
 #include "tests/scene_reading.h"
 
 #define MISS NAN

@@ -1,8 +1,8 @@
 // Tests shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // run_tests: sanitize-long-only
-#include "host/verify/reference_color.h"
 #include "tests/check.h"
 #include "tests/probe.h"
+#include "tests/reference.h"
 #include "tests/scene_reading.h"
 
 // A veil's light is taken once, even in a tile whose shadow rays run to different sides and so traverse the

@@ -1,10 +1,10 @@
 // Compares every shape at every precision with the reference: hit or miss, distance and normal.
 // run_tests: sanitize-long-only
 #include "host/base/ulp.h"
-#include "host/verify/reference.h"
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
+#include "tests/reference.h"
 #include "tests/scene_reading.h"
 
 enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_NEXT_TO_SIDE = 3, SEEDS_NEXT_TO_SIDE = 80 };

@@ -41,11 +41,6 @@ Quad3 reference_point(const ReferenceRay *ray, Quad t)
     return quad3_add(ray->origin, quad3_scale(ray->direction, t));
 }
 
-double reference_distance(Vector3 a, Quad3 b)
-{
-    return (double)quad3_length(quad3_subtract(quad3(a), b));
-}
-
 Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shininess)
 {
     Quad facing = quad3_dot(normal, to_light);
@@ -121,14 +116,6 @@ void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t obje
         nearest->object = object;
     }
     nearest->margin = margin;
-}
-
-ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
-{
-    ReferenceHit nearest = reference_miss();
-    for (size_t i = 0; i < scene->objects.count; i++)
-        reference_hit_record(&nearest, reference_hit_object(&scene->objects.items[i], ray), (uint32_t)i, ray);
-    return nearest;
 }
 
 ReferenceSurface reference_surface(const Object *object, Quad3 point)

@@ -49,8 +49,6 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
 // of equally distant objects is kept. Start with reference_miss, which has no hit.
 ReferenceHit reference_miss(void);
 void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray);
-// Returns the nearest hit of a scene. Among equal distances the lowest index counts.
-ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray);
 Quad3 reference_point(const ReferenceRay *ray, Quad t);
 
 // Reduces a margin to the magnitude of another one if that is smaller.
@@ -91,6 +89,3 @@ Quad reference_surface_distance(const ReferenceSurface *surface); // to its near
 // Returns Phong's highlight, max(0, R . V)^shininess, for unit vectors (B. T. Phong, "Illumination for
 // Computer Generated Images", CACM 18(6), 1975), or 0 if the light is behind the surface.
 Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shininess);
-
-// Returns the length of a - b. The difference is not rounded.
-double reference_distance(Vector3 a, Quad3 b);

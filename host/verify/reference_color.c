@@ -6,15 +6,6 @@
 #include <float.h>
 #include <math.h>
 
-ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
-{
-    ReferenceHit hit = reference_hit(scene, ray);
-    if (!hit.found) return (ReferenceColor){background_color(scene, ray->direction), (double)hit.margin};
-    const ReferenceScene world = {*scene, NULL};
-    ShadedPoint surface = shaded_point(&world, ray, &hit, 0, NULL);
-    return shaded_color(&world, &surface, (double)hit.margin, NULL);
-}
-
 // The absorption of light per length in the body around a ray and in the one around that.
 typedef struct {
     Color density, outer;
@@ -259,9 +250,4 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
                             .color = tree.sum,
                             .margin = size > 0 ? tree.margin / size : tree.margin,
                             .has_texture = tree.has_texture};
-}
-
-Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path)
-{
-    return reference_pixel(&(ReferenceScene){*scene, NULL}, ray, path, NULL).color;
 }

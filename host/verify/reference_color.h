@@ -11,11 +11,6 @@ typedef struct {
     double margin; // the least of the eye's ray, the shadow rays and a checker's edges
 } ReferenceColor;
 
-// Returns the color seen along a ray without reflection and refraction, which is the background, or ambient
-// light and Phong's with shadows. A transparent object passes its part of the light undeflected, once per
-// object.
-ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
-
 // Settings for reflections and refractions, with `bounce_count` of them in a row.
 //
 // If `blur` is not 0, the start and direction of each ray are perturbed by up to this part of the size of
@@ -42,4 +37,3 @@ bool reference_is_uncertain(const ReferencePixel *pixel);
 // Computes a pixel. Sets `shadows`, unless NULL, to whether each light fails to reach its surface, if any.
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
                                const ReferencePath *path, bool *shadows);
-Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);
