@@ -67,10 +67,9 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, const Render
     sample->shadows = memory_allocate_zeroed(sample->count * sample->light_count, sizeof(bool));
     for (size_t i = 0; i < sample->count; i++)
         place_choose(sample, columns, rows, i, sample->places[i]);
-    ReferenceScene reference = reference_scene_open(scene);
+    OwnedReferenceScene reference = reference_scene_open(scene);
     Computation computation = {sample, &reference, settings};
     parallel_run(sample->count, 1, pixels_compute, &computation);
-    reference_scene_close(&reference);
     if (!is_stopped(settings)) return true;
     certify_sample_close(sample);
     return false;
@@ -177,7 +176,7 @@ static void pixels_examine(void *context, size_t begin, size_t end)
     const ReferenceScene *scene = examination->scene;
     const RenderSettings *settings = examination->settings;
     const size_t lights = scene->scene.lights.count;
-    bool *shadows = memory_allocate_zeroed(2 * lights, sizeof *shadows);
+    OWNED bool *shadows = memory_allocate_zeroed(2 * lights, sizeof *shadows);
     for (size_t i = begin; i < end && !is_stopped(settings); i++) {
         const size_t pixel = examination->pixels[i];
         const uint32_t place[2] = {(uint32_t)(pixel % settings->width), (uint32_t)(pixel / settings->width)};
@@ -191,30 +190,27 @@ static void pixels_examine(void *context, size_t begin, size_t end)
                 examination->uncertainties[i] = WITNESSED;
         }
     }
-    free(shadows);
 }
 
 CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, const RenderSettings *settings,
-                                       size_t most)
+                                       size_t count_max)
 {
     CertifyUncertified found = {0};
     for (size_t i = 0; i < film_pixel_count(film); i++)
         found.count += film->flag[i] == FLAG_UNCERTIFIED;
-    const size_t step = found.count / most + 1;
-    size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels), chosen = 0;
+    const size_t step = found.count / count_max + 1;
+    OWNED size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels);
+    size_t chosen = 0;
     for (size_t i = 0, seen = 0; i < film_pixel_count(film); i++)
         if (film->flag[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
-    Uncertainty *uncertainties = memory_allocate(chosen, sizeof *uncertainties);
-    ReferenceScene reference = reference_scene_open(scene);
+    OWNED Uncertainty *uncertainties = memory_allocate(chosen, sizeof *uncertainties);
+    OwnedReferenceScene reference = reference_scene_open(scene);
     Examination examination = {&reference, settings, pixels, uncertainties};
     parallel_run(chosen, 1, pixels_examine, &examination);
-    reference_scene_close(&reference);
     found.examined = is_stopped(settings) ? 0 : chosen;
     for (size_t i = 0; i < found.examined; i++) {
         found.witnessed += uncertainties[i] == WITNESSED;
         found.close += uncertainties[i] == CLOSE;
     }
-    free(uncertainties);
-    free(pixels);
     return found;
 }

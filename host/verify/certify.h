@@ -61,7 +61,7 @@ typedef struct {
     size_t count, examined, witnessed, close;
 } CertifyUncertified;
 
-// Examines at most about `most` pixels, spread evenly over the image, on all processors. `settings` are those
-// of the sample. Examines none if settings->stop returned true.
+// Examines at most about `count_max` pixels, spread evenly over the image, on all processors. `settings` are
+// those of the sample. Examines none if settings->stop returned true.
 CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, const RenderSettings *settings,
-                                       size_t most);
+                                       size_t count_max);

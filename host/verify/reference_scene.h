@@ -12,6 +12,7 @@ typedef struct {
 
 ReferenceScene reference_scene_open(const Scene *scene); // the scene must outlive it
 void reference_scene_close(ReferenceScene *scene);
+#define OwnedReferenceScene __attribute__((cleanup(reference_scene_close))) ReferenceScene
 
 // Returns the hit of one object, or a miss if its bounding sphere is missed. `left` is the object on whose
 // surface the ray starts, UINT32_MAX for the eye. A start on a surface does not hit that surface or one that

@@ -162,7 +162,7 @@ static RenderSettings scene_settings(const VerifyRun *run, bool bvh, uint32_t wi
 static void scene_assign(const VerifyRun *run, Renderer **renderer, const Scene *scene,
                          const RenderSettings *settings)
 {
-    MessageList messages = {0};
+    OwnedMessageList messages = {0};
     if (!*renderer) {
         *renderer = renderer_open(run->compute, scene, settings, &messages);
     } else if (renderer_move(*renderer, scene, settings, &messages)) {
@@ -172,7 +172,6 @@ static void scene_assign(const VerifyRun *run, Renderer **renderer, const Scene 
         *renderer = NULL;
     }
     message_list_print(&messages, stderr);
-    message_list_free(&messages);
     if (!*renderer && compute_ok(run->compute)) fault("a hard case was refused on a suitable device");
     if (*renderer) run->kernels->lanes = renderer_report(*renderer)->lanes;
 }
@@ -275,10 +274,9 @@ void verify_record_ulps(VerifyRun *run, double error, double value, double bound
     verify_record(run, error / verify_ulp(run, value), bound, "ulp");
 }
 
-static bool scene_read(Scene *scene, const char *text, MessageList *messages)
+static bool text_read_scene(Scene *scene, const char *text, MessageList *messages)
 {
     const Source source = {"verify", text, strlen(text)};
-    *scene = (Scene){0};
     return scene_read_yaml(scene, &source, &(SceneOptions){0}, messages);
 }
 
@@ -302,28 +300,21 @@ Scene *verify_empty_scene(VerifyRun *run)
 
 Scene *verify_scene(VerifyRun *run, const char *format, ...)
 {
-    char *members;
+    OWNED char *members = NULL;
     ARGUMENTS_FORMAT(members, format);
-    char *text = text_format("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", members);
-    MessageList messages = {0};
+    OWNED char *text = text_format("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", members);
+    OwnedMessageList messages = {0};
     Scene *scene = scene_allocate(run);
-    if (!scene_read(scene, text, &messages))
+    if (!text_read_scene(scene, text, &messages))
         fault("a scene of verify cannot be read: %s\n%s", message_list_text(&messages), text);
-    message_list_free(&messages);
-    free(members);
-    free(text);
     return scene;
 }
 
 bool verify_is_refused(const char *text)
 {
-    MessageList messages = {0};
-    Scene scene;
-    const bool is_refused =
-        !scene_read(&scene, text, &messages) && message_count(&messages, MESSAGE_ERROR) > 0;
-    message_list_free(&messages);
-    scene_free(&scene);
-    return is_refused;
+    OwnedMessageList messages = {0};
+    OwnedScene scene = {0};
+    return !text_read_scene(&scene, text, &messages) && message_count(&messages, MESSAGE_ERROR) > 0;
 }
 
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
