@@ -21,7 +21,7 @@ static inline ReferenceHit reference_hit(const Scene *scene, const ReferenceRay 
 static inline ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_hit(scene, ray);
-    if (!hit.found) return (ReferenceColor){background_color(scene, ray->direction), (double)hit.margin};
+    if (!hit.found) return (ReferenceColor){reference_background(scene, ray->direction), (double)hit.margin};
     const ReferenceScene world = {*scene, NULL};
     const ShadedPoint surface = shaded_point(&world, ray, &hit, 0, NULL);
     return shaded_color(&world, &surface, (double)hit.margin, NULL);

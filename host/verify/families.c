@@ -196,20 +196,20 @@ static Vector3 vertex_displace(Vector3 vertex)
 
 typedef struct {
     Vector3 corners[3];
-} Corners;
+} TriangleCorners;
 
 // Returns one of the 4^depth parts of a spherical triangle, which pairs of bits of `path` select.
-static Corners icosphere_part(Corners whole, unsigned depth, unsigned path)
+static TriangleCorners icosphere_part(TriangleCorners whole, unsigned depth, unsigned path)
 {
     while (depth-- > 0) {
         Vector3 a = whole.corners[0], b = whole.corners[1], c = whole.corners[2];
         Vector3 ab = unit_vector(vector_add(a, b)), bc = unit_vector(vector_add(b, c)),
                 ca = unit_vector(vector_add(c, a));
-        const Corners parts[] = {{{a, ab, ca}}, {{ab, b, bc}}, {{ca, bc, c}}, {{ab, bc, ca}}};
+        const TriangleCorners parts[] = {{{a, ab, ca}}, {{ab, b, bc}}, {{ca, bc, c}}, {{ab, bc, ca}}};
         whole = parts[path >> (2 * depth) & 3];
     }
-    return (Corners){{vertex_displace(whole.corners[0]), vertex_displace(whole.corners[1]),
-                      vertex_displace(whole.corners[2])}};
+    return (TriangleCorners){{vertex_displace(whole.corners[0]), vertex_displace(whole.corners[1]),
+                              vertex_displace(whole.corners[2])}};
 }
 
 enum {
@@ -227,14 +227,15 @@ static Vector3 icosahedron_corner(unsigned i)
     return unit_vector((Vector3){golden, 0, one});
 }
 
-static Corners icosphere_triangle(unsigned index)
+static TriangleCorners icosphere_triangle(unsigned index)
 {
     static const unsigned char faces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
                                                {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
                                                {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
                                                {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
     const unsigned char *face = faces[index / ICOSPHERE_PARTS];
-    Corners whole = {{icosahedron_corner(face[0]), icosahedron_corner(face[1]), icosahedron_corner(face[2])}};
+    TriangleCorners whole = {
+        {icosahedron_corner(face[0]), icosahedron_corner(face[1]), icosahedron_corner(face[2])}};
     return icosphere_part(whole, ICOSPHERE_DEPTH, index % ICOSPHERE_PARTS);
 }
 
@@ -250,7 +251,7 @@ TraceRay family_from_within(uint64_t i)
 {
     unsigned point = sample_choice(31, i, 0, 100);
     Vector3 origin = vector_scale(sample_in_cube(32, point, 0), 0.17);
-    Corners triangle = icosphere_triangle(sample_choice(31, i, 1, ICOSPHERE_COUNT));
+    TriangleCorners triangle = icosphere_triangle(sample_choice(31, i, 1, ICOSPHERE_COUNT));
     unsigned first = sample_choice(31, i, 2, 3);
     Vector3 a = triangle.corners[first], b = triangle.corners[(first + 1) % 3],
             c = triangle.corners[(first + 2) % 3];

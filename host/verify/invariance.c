@@ -66,12 +66,12 @@ typedef struct {
     const Film *image;
     double scale; // of lengths
     bool mirrored;
-} View;
+} ChangedImage;
 
-static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
+static bool pixels_agree(const Film *a, size_t i, const ChangedImage *changed, size_t k)
 {
-    const Film *b = view->image;
-    double side = view->mirrored ? -1 : 1, scale = view->scale;
+    const Film *b = changed->image;
+    double side = changed->mirrored ? -1 : 1, scale = changed->scale;
     bool same = a->object[i] == b->object[k] && a->path[i] == b->path[k];
     same &= b->t[k] == a->t[i] * scale;
     for (size_t axis = 0; axis < 3; axis++) {
@@ -87,11 +87,11 @@ static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
 }
 
 // Counts the pixels that differ between two images, bit for bit except for the sign of a zero.
-static void check_view(VerifyRun *run, const Film *a, const View *view)
+static void check_change(VerifyRun *run, const Film *a, const ChangedImage *changed)
 {
     for (size_t i = 0; i < film_pixel_count(a); i++) {
-        size_t column = i % a->width, other = view->mirrored ? i + a->width - 1 - 2 * column : i;
-        run->result->differing += !pixels_agree(a, i, view, other);
+        size_t column = i % a->width, other = changed->mirrored ? i + a->width - 1 - 2 * column : i;
+        run->result->differing += !pixels_agree(a, i, changed, other);
     }
 }
 
@@ -107,7 +107,7 @@ void verify_scaled_scenes(VerifyRun *run)
         Scene *scaled = every_shape_scene(run);
         scene_scale(scaled, scale);
         Film other = verify_render(run, scaled, i % 2, 160, 120);
-        check_view(run, &image, &(View){&other, scale, false});
+        check_change(run, &image, &(ChangedImage){&other, scale, false});
         verify_release_since(run, &before);
     }
 }
@@ -196,7 +196,7 @@ void verify_mirrored_scenes(VerifyRun *run)
         Film image = verify_render(run, scene, false, width, 128);
         check_every_object(run, scene, &image);
         Film other = verify_render(run, mirrored, false, width, 128);
-        check_view(run, &image, &(View){&other, 1, true});
+        check_change(run, &image, &(ChangedImage){&other, 1, true});
     }
     Scene *scene = plain_scene(run), *turned = plain_scene(run);
     Film image = verify_render(run, scene, false, 256, 192);

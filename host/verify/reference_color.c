@@ -9,14 +9,14 @@
 // The absorption of light per length in the body around a ray and in the one around that.
 typedef struct {
     Color density, outer;
-} Medium;
+} ReferenceMedium;
 
 // A ray of a tree, the object that it leaves, and the part of its light that reaches the eye.
 typedef struct {
     ReferenceRay ray;
     uint32_t left; // UINT32_MAX for the eye
     Color weight;
-    Medium medium;
+    ReferenceMedium medium;
 } PathRay;
 
 // The state that all rays of a tree share.
@@ -65,11 +65,11 @@ static Color weight_left(Color weight, Color density, double length)
 // Returns whether a ray of this weight counts.
 static bool contributes(PathTree *tree, Color weight)
 {
-    const double largest = vector_largest(weight), least = tree->min_contribution;
-    if (largest <= 0 || least <= 0) return largest > 0;
+    const double largest = vector_largest(weight), weight_min = tree->min_contribution;
+    if (largest <= 0 || weight_min <= 0) return largest > 0;
     // weights are computed in double
-    if (fabs(largest - least) <= 0x1p-40 * least) tree->margin = 0;
-    return largest >= least;
+    if (fabs(largest - weight_min) <= 0x1p-40 * weight_min) tree->margin = 0;
+    return largest >= weight_min;
 }
 
 // Returns the nearest hit of a ray. An opaque surface that coincides with a transparent one covers it.
@@ -100,7 +100,7 @@ static void add_background(PathTree *tree, const PathRay *path, Quad margin)
 {
     const Scene *scene = &tree->world->scene;
     const Color weight = weight_left(path->weight, path->medium.density, INFINITY);
-    const Color color = background_color(scene, path->ray.direction);
+    const Color color = reference_background(scene, path->ray.direction);
     tree->sum = vector_add(tree->sum, vector_multiply(color, weight));
     margin_reduce(&tree->margin, margin);
     tree->has_texture = tree->has_texture || scene->sky.texture > 0;
@@ -130,7 +130,7 @@ static bool is_on_side(Quad3 direction, const ShadedPoint *surface, int side, do
     return height > 0;
 }
 
-static Quad3 surface_reflect(const ShadedPoint *surface, Quad3 direction, double *margin)
+static Quad3 direction_reflect(const ShadedPoint *surface, Quad3 direction, double *margin)
 {
     const Quad3 reflected = reference_reflect(direction, surface->normal);
     return is_on_side(reflected, surface, 1, margin) ? reflected
@@ -138,7 +138,7 @@ static Quad3 surface_reflect(const ShadedPoint *surface, Quad3 direction, double
 }
 
 // Returns false at total reflection.
-static bool surface_refract(const ShadedPoint *surface, Quad3 direction, Quad3 *refracted, double *margin)
+static bool direction_refract(const ShadedPoint *surface, Quad3 direction, Quad3 *refracted, double *margin)
 {
     const Quad ior = surface->material->ior, eta = surface->entering ? 1 / ior : ior;
     if (!reference_refract(direction, surface->normal, eta, refracted, margin)) return false;
@@ -184,7 +184,7 @@ static void add_bounces(PathTree *tree, const PathRay *path, const ShadedPoint *
                          path->medium};
     PathRay reflected = refracted;
     const bool is_total = material->transmission.largest > 0 &&
-                          !surface_refract(surface, direction, &refracted.ray.direction, &tree->margin);
+                          !direction_refract(surface, direction, &refracted.ray.direction, &tree->margin);
     Color reflected_part, refracted_part;
     surface_split(surface, is_total, &reflected_part, &refracted_part);
     reflected.weight = weights_multiply(path->weight, reflected_part);
@@ -194,12 +194,12 @@ static void add_bounces(PathTree *tree, const PathRay *path, const ShadedPoint *
                   (reflects ? PATH_REFLECTED : 0u) | (refracts ? PATH_REFRACTED : 0u) |
                       (reflects && is_total ? PATH_TOTAL_REFLECTION : 0u));
     if (reflects) {
-        reflected.ray.direction = surface_reflect(surface, direction, &tree->margin);
+        reflected.ray.direction = direction_reflect(surface, direction, &tree->margin);
         add_path(tree, &reflected, bounces_left - 1);
     }
     if (!refracts) return;
-    refracted.medium = surface->entering ? (Medium){material->absorption, path->medium.density}
-                                         : (Medium){.density = path->medium.outer};
+    refracted.medium = surface->entering ? (ReferenceMedium){material->absorption, path->medium.density}
+                                         : (ReferenceMedium){.density = path->medium.outer};
     add_path(tree, &refracted, bounces_left - 1);
 }
 

@@ -207,7 +207,7 @@ ReferenceColor shaded_color(const ReferenceScene *world, const ShadedPoint *surf
     return sum;
 }
 
-Color background_color(const Scene *scene, Quad3 direction)
+Color reference_background(const Scene *scene, Quad3 direction)
 {
     if (vector_is_zero(scene->sky.up)) return scene->background;
     const double height = (double)quad3_dot(quad3_unit(direction), quad3_unit(quad3(scene->sky.up)));

@@ -36,4 +36,4 @@ ShadedPoint shaded_point(const ReferenceScene *world, const ReferenceRay *ray, R
 ReferenceColor shaded_color(const ReferenceScene *world, const ShadedPoint *surface, double margin,
                             bool *shadows);
 // Returns the background in a direction of any length.
-Color background_color(const Scene *scene, Quad3 direction);
+Color reference_background(const Scene *scene, Quad3 direction);

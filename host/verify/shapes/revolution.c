@@ -10,35 +10,35 @@ typedef struct {
     Quad3 from, axis;
     Quad base, slope, height;
     bool finite, caps, only_inside;
-} Revolution;
+} RevolutionBody;
 
-static Revolution revolution_of(const Object *object)
+static RevolutionBody revolution_of(const Object *object)
 {
     bool is_cylinder = object->type == SHAPE_CYLINDER;
     Quad3 axis = quad3(is_cylinder ? object->as.cylinder.axis : object->as.cone.axis);
     Quad height = quad3_length(axis);
     axis = quad3_scale(axis, 1 / height);
     if (is_cylinder)
-        return (Revolution){.from = quad3(object->as.cylinder.from),
-                            .axis = axis,
-                            .base = object->as.cylinder.radius,
-                            .height = height,
-                            .finite = object->as.cylinder.finite,
-                            .caps = object->as.cylinder.caps,
-                            .only_inside = object->as.cylinder.only_inside};
+        return (RevolutionBody){.from = quad3(object->as.cylinder.from),
+                                .axis = axis,
+                                .base = object->as.cylinder.radius,
+                                .height = height,
+                                .finite = object->as.cylinder.finite,
+                                .caps = object->as.cylinder.caps,
+                                .only_inside = object->as.cylinder.only_inside};
     Quad first = object->as.cone.radius[0], second = object->as.cone.radius[1];
     bool finite = object->as.cone.finite;
-    return (Revolution){.from = quad3(object->as.cone.from),
-                        .axis = axis,
-                        .base = finite ? first : 0,
-                        .slope = finite ? (second - first) / height : object->as.cone.slope,
-                        .height = height,
-                        .finite = finite,
-                        .caps = object->as.cone.caps,
-                        .only_inside = object->as.cone.only_inside};
+    return (RevolutionBody){.from = quad3(object->as.cone.from),
+                            .axis = axis,
+                            .base = finite ? first : 0,
+                            .slope = finite ? (second - first) / height : object->as.cone.slope,
+                            .height = height,
+                            .finite = finite,
+                            .caps = object->as.cone.caps,
+                            .only_inside = object->as.cone.only_inside};
 }
 
-static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceHit *hit)
+static void hit_side(const RevolutionBody *body, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad3 axes[3];
     axes_around(body->axis, axes);
@@ -85,7 +85,7 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
 
 static void hit_revolution(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
-    Revolution body = revolution_of(object);
+    RevolutionBody body = revolution_of(object);
     hit_side(&body, ray, hit);
     if (!body.finite || !body.caps) return;
     hit_disc_at(body.from, quad3_scale(body.axis, -1), body.base, ray, hit);
@@ -96,7 +96,7 @@ static void hit_revolution(const Object *object, const ReferenceRay *ray, Refere
 // Measures in the half-plane of the axis and the point, `along` the axis from the base and `off` it.
 static void surface_revolution(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
-    Revolution body = revolution_of(object);
+    RevolutionBody body = revolution_of(object);
     Quad3 from = quad3_subtract(point, body.from), axis = body.axis;
     Quad along = quad3_dot(from, axis);
     if (!body.finite && body.slope != 0 && along < 0) {

@@ -135,8 +135,8 @@ static void hit_superellipsoid(const Object *object, const ReferenceRay *ray, Re
         return;
     }
     const Quad turn = first < last ? sign_change(slope_at, &line, first, last) : first;
-    const Gauge least = gauge_at(&space, line_point(&line, turn));
-    if (least.reach < UNBOUNDED) hit_reduce_margin(hit, 2 * (least.gauge - 1) * least.reach);
+    const Gauge closest = gauge_at(&space, line_point(&line, turn));
+    if (closest.reach < UNBOUNDED) hit_reduce_margin(hit, 2 * (closest.gauge - 1) * closest.reach);
     if (!(excess_at(&line, turn) < 0)) return;
     for (int i = 0; i < 2; i++) {
         const Quad t = sign_change(excess_at, &line, turn, interval[i]);
