@@ -129,10 +129,10 @@ static BinMap bins_make(BuildBox centers, size_t count, BvhLeaves leaves)
     const Float4 extent = centers.high - centers.low;
     // a smaller extent would overflow the scale; a little less than bin_count keeps the highest center in the
     // last bin
-    const float least = 0x1p-120f, bins = (float)bin_count * (1 - 1e-6f);
-    const Float4 least_extent = {least, least, least, FLT_MAX};
-    const Int4 is_splittable = extent > least_extent;
-    const Float4 scale = (Float4){bins, bins, bins, bins} / float4_max(extent, least_extent);
+    const float minimum = 0x1p-120f, bins = (float)bin_count * (1 - 1e-6f);
+    const Float4 extent_min = {minimum, minimum, minimum, FLT_MAX};
+    const Int4 is_splittable = extent > extent_min;
+    const Float4 scale = (Float4){bins, bins, bins, bins} / float4_max(extent, extent_min);
     return (BinMap){centers.low, float4_select(is_splittable, scale, (Float4){0, 0, 0, 0}), bin_count,
                     leaves};
 }

@@ -45,9 +45,9 @@ static uint4 cutout_of(const CompiledScene *compiled, const Material *material)
 {
     if (material->cutout.threshold == 0 || material->cutout.texture == 0) return (uint4){0, 0, 0, 0};
     const CompiledTexture *texture = &compiled->textures[material->cutout.texture - 1];
-    const float least = (float)material->cutout.threshold;
+    const float threshold = (float)material->cutout.threshold;
     uint4 cutout = {1 + texture->first_level, 0, material->image.wraps[0], material->image.wraps[1]};
-    memcpy(&cutout.y, &least, sizeof least);
+    memcpy(&cutout.y, &threshold, sizeof threshold);
     return cutout;
 }
 

@@ -33,9 +33,9 @@ static void range_measure(void *context, size_t begin, size_t end)
         const Object *object = &scene->objects.items[i];
         const Bounds bounds = object_bounds(scene, object);
         if (object->type == SHAPE_OVAL) {
-            double least, most;
-            oval_stretches(object, &least, &most);
-            extent.largest_stretch = fmax(extent.largest_stretch, most / least);
+            double shortest, longest;
+            oval_stretches(object, &shortest, &longest);
+            extent.largest_stretch = fmax(extent.largest_stretch, longest / shortest);
         }
         if (bounds_is_everywhere(&bounds)) {
             extent.unbounded_count++;

@@ -120,28 +120,28 @@ void oval_transform(Object *object, const Affine *affine)
     if (object->as.oval.unit != SHAPE_TORUS) axis_rescale(object);
 }
 
-static void axes_stretches(const Vector3 axes[3], double *least, double *most)
+static void axes_stretches(const Vector3 axes[3], double *shortest, double *longest)
 {
     Vector3 turned[3] = {axes[0], axes[1], axes[2]};
     axes_turn_all(turned);
-    *least = INFINITY, *most = 0;
+    *shortest = INFINITY, *longest = 0;
     for (int i = 0; i < 3; i++) {
-        *least = fmin(*least, vector_length(turned[i]));
-        *most = fmax(*most, vector_length(turned[i]));
+        *shortest = fmin(*shortest, vector_length(turned[i]));
+        *longest = fmax(*longest, vector_length(turned[i]));
     }
 }
 
-void oval_stretches(const Object *oval, double *least, double *most)
+void oval_stretches(const Object *oval, double *shortest, double *longest)
 {
-    axes_stretches(oval->as.oval.axes, least, most);
+    axes_stretches(oval->as.oval.axes, shortest, longest);
 }
 
 bool axes_are_moderate(const Vector3 axes[3])
 {
-    double least, most;
-    axes_stretches(axes, &least, &most);
+    double shortest, longest;
+    axes_stretches(axes, &shortest, &longest);
     const Vector3 across = vector_cross(vector_normalize(axes[0]), vector_normalize(axes[1]));
-    return least >= 1e-6 * most &&
+    return shortest >= 1e-6 * longest &&
            fabs(vector_dot(across, vector_normalize(axes[2]))) >= 0.00175; // the sine of 0.1 degrees
 }
 

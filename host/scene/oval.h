@@ -22,6 +22,6 @@ Object oval_unit(const Object *oval);
 Affine oval_map(const Object *oval);
 
 // Returns the least and the greatest length of the oval's image of a unit vector.
-void oval_stretches(const Object *oval, double *least, double *most);
+void oval_stretches(const Object *oval, double *shortest, double *longest);
 
 bool oval_is_bounded(const Object *oval);

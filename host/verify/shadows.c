@@ -30,19 +30,20 @@ void verify_plane_acne(VerifyRun *run)
             Vector3 direction = vector_normalize(scene->lights.items[0].direction);
             Quad3 stored = quad3(verify_rounded_vector(run, direction));
             Quad cosine = -quad3_dot(quad3_unit(quad3(normal)), stored);
-            double least = INFINITY, most = 0;
+            double darkest = INFINITY, brightest = 0;
             for (size_t i = 0; i < film_pixel_count(&image); i++) {
                 run->result->leaks += image.object[i] != 0;
                 run->result->wrong += image.shadow[i] != 0;
-                least = fmin(least, image.color[3 * i]);
-                most = fmax(most, image.color[3 * i]);
+                darkest = fmin(darkest, image.color[3 * i]);
+                brightest = fmax(brightest, image.color[3 * i]);
             }
-            run->result->wrong += !(least > 0);
-            verify_record_ulps(run, most - least, most, 0);
+            run->result->wrong += !(darkest > 0);
+            verify_record_ulps(run, brightest - darkest, brightest, 0);
             const double u = verify_roundoff(run);
             verify_record(
-                run, (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u, 8,
-                "u");
+                run,
+                (double)quad_maximum(quad_absolute(brightest - cosine), quad_absolute(darkest - cosine)) / u,
+                8, "u");
             verify_release_since(run, &before);
         }
     }

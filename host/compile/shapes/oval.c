@@ -33,10 +33,10 @@ static void oval_flatten(Flattening *flattening, const Object *object)
     const Vector3 center = point_from_eye(rounding, object->as.oval.center);
     const double *radii = object->as.oval.radii, half_height = object->as.oval.half_height;
     const bool is_bounded = oval_is_bounded(object);
-    double least, most;
+    double shortest, longest;
     int exponent;
-    oval_stretches(object, &least, &most);
-    frexp(most, &exponent);
+    oval_stretches(object, &shortest, &longest);
+    frexp(longest, &exponent);
     const double unit = ldexp(1, exponent);
     const InstanceMap map = instance_map(&transform, unit, true);
     const double condition = map_condition(&map);
@@ -53,7 +53,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
         .id.z = object->as.oval.unit,
     };
     map_round(rounding, &map, (const double[]){center.x, center.y, center.z}, oval.rows, oval.inverses);
-    oval.inverses[0].w = unit / least * (1 + 1e-6); // more than the roundings
+    oval.inverses[0].w = unit / shortest * (1 + 1e-6); // more than the roundings
     oval.inverses[1].w = reach;
     if (object->as.oval.unit == SHAPE_TORUS) {
         oval.sizes.y = radii[0] * unit;

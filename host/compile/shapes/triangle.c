@@ -31,8 +31,8 @@ static Vector3 needle_normal(Vector3 a, Vector3 b, Vector3 c, double least_sine)
                 across = quad3_cross(ab, ac);
     const Quad largest =
         quad_maximum(quad_absolute(across.x), quad_maximum(quad_absolute(across.y), quad_absolute(across.z)));
-    const Quad least = least_sine * quad3_length(ab) * quad3_length(ac);
-    if (!(largest > 0) || quad3_length(across) < least) return (Vector3){0, 0, 0};
+    const Quad length_min = least_sine * quad3_length(ab) * quad3_length(ac);
+    if (!(largest > 0) || quad3_length(across) < length_min) return (Vector3){0, 0, 0};
     return quad3_rounded(quad3_scale(across, 1 / largest));
 }
 
