@@ -6,17 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    double sum, error; // exactly what was added
-} ExactSum;
-
-// Returns a sum with its error (Knuth, The Art of Computer Programming 2, 4.2.2).
-static ExactSum two_sum(double a, double b)
-{
-    double sum = a + b, part = sum - a;
-    return (ExactSum){sum, (a - (sum - part)) + (b - part)};
-}
-
 // Multiplies the orientation's terms out, each product an exact pair, and adds them up without loss as an
 // expansion whose last nonzero component has its sign (Shewchuk, Adaptive precision floating-point arithmetic
 // and fast robust geometric predicates, Discrete & Computational Geometry 18, 1997, section 2.4).

@@ -1,4 +1,4 @@
-// Vectors in double.
+// Sums and vectors in double.
 #pragma once
 
 #include <float.h>
@@ -8,6 +8,17 @@
 #if FLT_EVAL_METHOD != 0 || defined(__FAST_MATH__)
 #error "glint needs IEEE arithmetic: no -ffast-math, and on 32-bit x86 -msse2 -mfpmath=sse"
 #endif
+
+typedef struct {
+    double sum, error; // exactly what was added
+} ExactSum;
+
+// Returns a sum with its error (Knuth, The Art of Computer Programming 2, 4.2.2).
+static inline ExactSum two_sum(double a, double b)
+{
+    const double sum = a + b, part = sum - a;
+    return (ExactSum){sum, (a - (sum - part)) + (b - part)};
+}
 
 typedef struct {
     double x, y, z;

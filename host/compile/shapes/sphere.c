@@ -20,13 +20,12 @@ static EyePower eye_power(const Rounding *rounding, const Object *object, Vector
                  stored[] = {center.x, center.y, center.z};
     double sum = -square, rest = -fma(radius, radius, -square), moved_square = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const double start = starts[axis], end = ends[axis], step = end - start, of_end = step + start,
-                     low = (end - of_end) - (start - (of_end - step));
-        const double product = step * step, next = sum + product, of_product = next - sum;
-        rest += ((sum - (next - of_product)) + (product - of_product)) + fma(step, step, -product) +
-                low * (2 * step + low);
-        sum = next;
-        const double moved = (step - stored[axis]) + low;
+        const ExactSum step = two_sum(ends[axis], -starts[axis]);
+        const double product = step.sum * step.sum;
+        const ExactSum next = two_sum(sum, product);
+        rest += next.error + fma(step.sum, step.sum, -product) + step.error * (2 * step.sum + step.error);
+        sum = next.sum;
+        const double moved = (step.sum - stored[axis]) + step.error;
         moved_square += moved * moved;
     }
     return (EyePower){sum + rest, sqrt(moved_square) + fabs(radius - rounded(rounding, radius))};
