@@ -16,13 +16,9 @@ typedef struct {
 // The eye is near a shape if it is within this part of the shape's size.
 #define NEAR_EYE 0x1p-6
 
-// GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile
-// keeps it.
 static inline double rounded(const Rounding *rounding, double value)
 {
-    if (rounding->is_double) return value;
-    volatile float narrow = (float)value;
-    return narrow;
+    return rounding->is_double ? value : rounded_to_float(value);
 }
 
 static inline Vector3 vector_rounded(const Rounding *rounding, Vector3 v)

@@ -1,4 +1,4 @@
-// Sums and vectors in double.
+// Numbers and vectors in double.
 #pragma once
 
 #include <float.h>
@@ -18,6 +18,15 @@ static inline ExactSum two_sum(double a, double b)
 {
     const double sum = a + b, part = sum - a;
     return (ExactSum){sum, (a - (sum - part)) + (b - part)};
+}
+
+// Returns a number rounded to float. GCC 12 at -O2 drops a conversion to float and back where it merges
+// stores
+// (-ftree-slp-vectorize); volatile keeps it.
+static inline double rounded_to_float(double value)
+{
+    volatile float single = (float)value;
+    return single;
 }
 
 typedef struct {

@@ -17,16 +17,10 @@ ReferenceRay reference_ray(Vector3 origin, Vector3 direction)
     return (ReferenceRay){quad3(origin), quad3(direction), 0, (Quad)FLT_MAX};
 }
 
-static void round_number(double *number)
-{
-    volatile float single = (float)*number; // volatile: see host/compile/rounding.c
-    *number = (double)single;
-}
-
 static void round_numbers(double *numbers, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        round_number(&numbers[i]);
+        numbers[i] = rounded_to_float(numbers[i]);
 }
 
 ReferenceRay reference_ray_rounded(Vector3 origin, Vector3 direction)

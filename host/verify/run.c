@@ -57,9 +57,7 @@ double verify_ulp(const VerifyRun *run, double value)
 
 double verify_rounded(const VerifyRun *run, double value)
 {
-    if (verify_is_double(run)) return value;
-    volatile float single = (float)value; // volatile: see host/compile/rounding.c
-    return single;
+    return verify_is_double(run) ? value : rounded_to_float(value);
 }
 
 Vector3 verify_rounded_vector(const VerifyRun *run, Vector3 vector)
