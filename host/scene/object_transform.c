@@ -145,7 +145,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
     }
     if (!shape_transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
-            return "with an image would change its shape, and then cannot have one";
+            return "with an image would become another shape, which cannot have images";
         oval_make(object);
         oval_transform(object, affine);
     }
