@@ -1,4 +1,4 @@
-// Meshes that instances share: which objects share one, and what is compiled of both.
+// Meshes that instances share, and the instances.
 #pragma once
 
 #include "host/compile/flatten.h"
@@ -69,5 +69,5 @@ uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id);
 // Appends the shared meshes' triangles, entries and BVHs to the scene's, and sets FLAT_SHARED_MESHES and the
 // instances' places.
 void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);
-// Hides what shared_meshes_append added to the counts of arrays, or shows it again.
+// Hides what shared_meshes_append added to the counts of arrays, or shows it if it is hidden.
 void shared_meshes_toggle(CompiledScene *compiled);

@@ -56,13 +56,10 @@ static void png_note(PngState *state, const ImageNote *note)
     bool is_ascii = true;
     for (const char *at = note->value; *at; at++)
         is_ascii = is_ascii && (unsigned char)*at < 0x80;
-    char *key = memory_copy_text(note->key), *content = memory_copy_text(note->value);
-    png_text chunk = {.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE,
-                      .key = key,
-                      .text = content};
-    png_set_text(state->png, state->info, &chunk, 1);
-    free(key);
-    free(content);
+    const png_text chunk = {.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE,
+                            .key = (char *)note->key,
+                            .text = (char *)note->value};
+    png_set_text(state->png, state->info, &chunk, 1); // copies both
 }
 
 static bool png_begin(ImageWriter *writer, MessageList *messages)

@@ -5,7 +5,8 @@
 
 void mesh_free(Mesh *mesh); // frees and zeroes
 
-// Joins vertices whose numbers are all equal, where 0 equals -0, and removes vertices that no triangle uses.
+// Merges vertices with equal positions, normals and texture coordinates (0 equals -0), and removes vertices
+// that no triangle uses.
 void mesh_join_vertices(Mesh *mesh);
 
 // Sets each vertex normal to the mean of the triangles around it, weighted by angle, or to zero if none of

@@ -24,8 +24,7 @@ static Film view_render(VerifyRun *run, Vector3 place, Vector3 eye, Vector3 look
     Scene *scene = tiled_scene(run, place);
     scene->camera = verify_camera(eye, look_at, fov);
     scene->camera.up = up;
-    Film image = verify_render(run, scene, false, SIDE, SIDE);
-    return image;
+    return verify_render(run, scene, false, SIDE, SIDE);
 }
 
 static void check_same(VerifyRun *run, const Film *a, const Film *b)
