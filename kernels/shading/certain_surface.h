@@ -65,7 +65,7 @@ static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints 
                                             const Ray *ray, const Hit *hit)
 {
     SurfacePoint *point = &points->point;
-    // the exact hit lies as near to the ray's own point as position_error says
+    // the exact hit lies within position_error of the ray's own point
     point->position = ray_point(ray, hit->t);
     if (HAS_CHORDS && points->entry.x == TYPE_SPHERES) {
         Sphere sphere = scene->spheres[points->entry.y];

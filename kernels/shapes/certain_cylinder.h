@@ -92,13 +92,13 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
         const mask stays_out = distance * less - change > outer;
         interval.perhaps = interval.perhaps & !(parallel & stays_out);
         interval.certain = interval.certain | (parallel & stays_in);
-        const real most = (real)(LARGEST);
-        real_replace(&interval.outer.near, parallel, -most);
-        real_replace(&interval.outer.far, parallel, most);
+        const real largest = (real)(LARGEST);
+        real_replace(&interval.outer.near, parallel, -largest);
+        real_replace(&interval.outer.far, parallel, largest);
         real_replace(&interval.inner.near, parallel, part.near);
         real_replace(&interval.inner.far, parallel, part.far);
-        real_replace(&interval.roots.near, parallel, -most);
-        real_replace(&interval.roots.far, parallel, most);
+        real_replace(&interval.roots.near, parallel, -largest);
+        real_replace(&interval.roots.far, parallel, largest);
     }
     // The bounds hold only between `from` and `to`. Where numbers overflow, nothing is known.
     interval.certain =

@@ -55,12 +55,12 @@ typedef struct {
     Vector middle;
 } RoundSolid;
 
-// Returns the interval where slope t >= least.
-static inline Interval interval_above(real slope, real least)
+// Returns the interval where slope t >= height.
+static inline Interval interval_above(real slope, real height)
 {
     mask rises = slope > SMALLEST_RATIO, falls = slope < -SMALLEST_RATIO;
-    real t = real_divide(least, lanes_select(rises | falls, slope, (real)(1)));
-    real empty = lanes_select(least > 0, (real)(LARGEST), (real)(-LARGEST));
+    real t = real_divide(height, lanes_select(rises | falls, slope, (real)(1)));
+    real empty = lanes_select(height > 0, (real)(LARGEST), (real)(-LARGEST));
     real none = lanes_select(rises, t, lanes_select(falls, (real)(-LARGEST), empty));
     return (Interval){none, lanes_select(falls, t, (real)(LARGEST))};
 }

@@ -121,7 +121,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     perhaps = perhaps & (sinks | !ray_excludes(ray, low - vertex_error, high + vertex_error));
     if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, position_error * ray->across_length);
-    // applies to uncertain lanes, which are hit, if at all, where the weights say
+    // applies to uncertain lanes, which are hit, if at all, within the weights' bounds
     mask narrows = perhaps & (fabs(edges->determinant) > DIVISOR_MIN * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
     real t = ts.c + real_fma(ts.a - ts.c, edges->u * inverse, (ts.b - ts.c) * (edges->v * inverse));
