@@ -40,9 +40,7 @@ typedef struct {
 
 static double trial_rounded(const Trial *trial, double value)
 {
-    if (trial->is_double) return value;
-    volatile float narrow = (float)value;
-    return narrow;
+    return trial->is_double ? value : rounded_to_float(value);
 }
 
 static Vector3 trial_vector_rounded(const Trial *trial, Vector3 v)
