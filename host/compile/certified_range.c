@@ -24,12 +24,9 @@ typedef struct {
     atomic_bool exceeds;
 } RangeTest;
 
-// Returns whether a torus in an oval's unit space is in range.
-static bool unit_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)
+static bool torus_is_in_range(const CertifiedRange *range, double size, double reach)
 {
-    const double unit = oval->sizes.x;
-    return oval->id.z != TYPE_TORI ||
-           (unit <= range->torus_max && (unit >= range->torus_min || unit <= range->roundoff * reach));
+    return size <= range->torus_max && (size >= range->torus_min || size <= range->roundoff * reach);
 }
 
 static bool is_in_range(const CertifiedRange *range, size_t type, const void *primitive)
@@ -40,11 +37,11 @@ static bool is_in_range(const CertifiedRange *range, size_t type, const void *pr
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
     if (shape_ops[type]->stretch && !(shape_ops[type]->stretch(primitive) * reach <= range->reach_max))
         return false;
-    if (type == TYPE_OVALS) return unit_is_in_range(range, primitive, reach);
-    if (type != TYPE_TORI) return true;
     const Torus *torus = primitive;
-    const double size = torus->center_major.w + torus->axis_minor.w;
-    return size <= range->torus_max && (size >= range->torus_min || size <= range->roundoff * reach);
+    if (type == TYPE_TORI)
+        return torus_is_in_range(range, torus->center_major.w + torus->axis_minor.w, reach);
+    const Oval *oval = primitive;
+    return type != TYPE_OVALS || oval->id.z != TYPE_TORI || torus_is_in_range(range, oval->sizes.x, reach);
 }
 
 static void range_test(void *context, size_t begin, size_t end)

@@ -10,11 +10,6 @@ const char *const precision_names[PRECISION_COUNT] = {"single", "strict", "doubl
 
 const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
 
-static Vector3 eye_of(const Scene *scene, const CompileSettings *settings)
-{
-    return settings->shift_to_eye ? scene->camera.position : (Vector3){0};
-}
-
 static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
 {
     return (Rounding){.eye = eye,

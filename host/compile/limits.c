@@ -58,19 +58,12 @@ static char *extreme_describe(const Scene *scene, const Extreme *extreme)
                        scene->included.items[object->file - 1].path);
 }
 
-// Returns the distance of a box's farthest side from the eye, along an axis.
-static double box_reach(const Bounds *bounds, Vector3 eye)
-{
-    return fmax(vector_largest(vector_subtract(bounds->min, eye)),
-                vector_largest(vector_subtract(bounds->max, eye)));
-}
-
 void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSettings *settings,
                  MessageList *messages)
 {
     const double detail = 1e-12;
     if (settings->precision == PRECISION_DOUBLE || settings->certifies) return;
-    const Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    const Vector3 eye = eye_of(scene, settings);
     if (!(extent->least_width < detail * box_reach(&extent->bounds, eye))) return;
     Extreme farthest = {NULL, 0}, smallest = {NULL, INFINITY};
     for (size_t i = 0; i < scene->objects.count; i++) {
@@ -141,7 +134,7 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const SceneEx
                 const CompileSettings *settings, MessageList *messages)
 {
     const double farthest = 1e18 * fmin(1, 4 / extent->largest_stretch);
-    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+    const Vector3 eye = eye_of(scene, settings);
     if (settings->precision == PRECISION_DOUBLE) return true;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];

@@ -13,6 +13,12 @@ double box_width(const Bounds *bounds)
     return middle > 0 ? middle : vector_largest(size);
 }
 
+double box_reach(const Bounds *bounds, Vector3 from)
+{
+    return fmax(vector_largest(vector_subtract(bounds->min, from)),
+                vector_largest(vector_subtract(bounds->max, from)));
+}
+
 static SceneExtent extent_empty(void)
 {
     return (SceneExtent){bounds_empty(), 0, INFINITY, 1};

@@ -5,6 +5,12 @@
 #include "host/compile/rounding.h"
 #include "host/compile/scene_bounds.h"
 
+// Returns the point that becomes the origin.
+static inline Vector3 eye_of(const Scene *scene, const CompileSettings *settings)
+{
+    return settings->shift_to_eye ? scene->camera.position : (Vector3){0};
+}
+
 // limits.c: Returns false with a message if the scene has more primitives than ids, more unshared ones than
 // a BVH counts, or more copies than instances may have.
 bool size_fits(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

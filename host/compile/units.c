@@ -2,11 +2,6 @@
 #include "host/compile/stages.h"
 #include <stdlib.h>
 
-static double distance_largest(Vector3 from, Vector3 to)
-{
-    return vector_largest(vector_subtract(to, from));
-}
-
 // Returns the largest side of the smallest bounded object's box, or 0 if none has any size.
 static double smallest_size(const Scene *scene)
 {
@@ -28,11 +23,9 @@ double scene_unit(const Scene *scene, const SceneExtent *extent, const CompileSe
 {
     if (settings->precision == PRECISION_DOUBLE) return 1;
     const int harmless = 30; // exponents up to there
-    Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
-    const Bounds bounds = extent->bounds;
-    if (bounds_is_empty(&bounds)) return 1;
+    if (bounds_is_empty(&extent->bounds)) return 1;
     int farthest, smallest;
-    frexp(fmax(distance_largest(eye, bounds.min), distance_largest(eye, bounds.max)), &farthest);
+    frexp(box_reach(&extent->bounds, eye_of(scene, settings)), &farthest);
     if (abs(farthest) <= harmless) return 1;
     frexp(smallest_size(scene), &smallest);
     int middle = (farthest + smallest) / 2;
