@@ -83,7 +83,7 @@ static double *linear_values(const Image *image)
     return values;
 }
 
-static float pixel_error(const double *expected, const double *found, uint32_t channels)
+static float largest_channel_error(const double *expected, const double *found, uint32_t channels)
 {
     float error = 0;
     for (uint32_t i = 0; i < channels; i++)
@@ -96,7 +96,7 @@ void image_errors(const Image *reference, const Image *test, float *errors)
     const uint32_t channels = reference->channels;
     OWNED double *expected = linear_values(reference), *found = linear_values(test);
     for (size_t i = 0; i < pixel_count(reference); i++)
-        errors[i] = pixel_error(expected + i * channels, found + i * channels, channels);
+        errors[i] = largest_channel_error(expected + i * channels, found + i * channels, channels);
 }
 
 static uint32_t display_step(const Image *image, size_t i)
@@ -161,7 +161,7 @@ static void light_compare(ImageMetrics *metrics, const Image *reference, const I
         const double *pixel = expected + i * channels, *other = found + i * channels;
         metrics->nonfinite_reference += !is_finite_pixel(pixel, channels);
         metrics->nonfinite_test += !is_finite_pixel(other, channels);
-        const float error = pixel_error(pixel, other, channels);
+        const float error = largest_channel_error(pixel, other, channels);
         if (error > worst_error) {
             worst = i;
             worst_error = error;
