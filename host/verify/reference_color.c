@@ -1,7 +1,6 @@
 // Follows a ray and its reflections and refractions.
 #include "host/verify/reference_color.h"
 
-#include "host/verify/reference_optics.h"
 #include "host/verify/reference_shading.h"
 #include <float.h>
 #include <math.h>
@@ -118,6 +117,56 @@ static void add_surface(PathTree *tree, const ShadedPoint *surface, Color weight
     tree->sum = vector_add(tree->sum, vector_multiply(shaded.color, weight));
     margin_reduce(&tree->margin, shaded.margin);
     tree->has_texture = tree->has_texture || surface->material->image.texture > 0;
+}
+
+// Returns the direction of the reflected ray. Directions are unit vectors, and normals are on the ray's side.
+static Quad3 reference_reflect(Quad3 direction, Quad3 normal)
+{
+    return quad3_subtract(direction, quad3_scale(normal, 2 * quad3_dot(direction, normal)));
+}
+
+// Sets *refracted to the direction of the refracted ray, by Snell's law. The sine behind the surface is `eta`
+// times that in front of it. Returns false if it exceeds 1. Reduces the margin to the squared cosine behind
+// the surface, which is negative then.
+static bool reference_refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, double *margin)
+{
+    Quad cosine = -quad3_dot(direction, normal);
+    Quad squared = 1 - eta * eta * (1 - cosine * cosine);
+    margin_reduce(margin, squared);
+    if (squared < 0) return false;
+    *refracted =
+        quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
+    return true;
+}
+
+// Returns the part of unpolarized light that a body of this index reflects (Fresnel).
+static Quad reference_reflectance(Quad cosine, Quad ior, bool entering)
+{
+    const Quad eta = entering ? 1 / ior : ior, squared = 1 - eta * eta * (1 - cosine * cosine);
+    if (squared <= 0) return 1;
+    const Quad behind = QUAD_CALL(sqrt)(squared), near = entering ? 1 : ior, far = entering ? ior : 1;
+    const Quad across = (near * cosine - far * behind) / (near * cosine + far * behind),
+               along = (near * behind - far * cosine) / (near * behind + far * cosine);
+    return (across * across + along * along) / 2;
+}
+
+// Returns the part of unpolarized light that a conductor of index n + i k reflects. With the index m, M = m^2
+// and q^2 = M - sine^2, the amplitude is (c - q) / (c + q) across the plane of incidence and (M c - q) / (M c
+// + q) along it.
+static double reference_conductor_reflectance(Quad cosine, double n, double k)
+{
+    const Quad real = (Quad)n * n - (Quad)k * k, imaginary = 2 * (Quad)n * k;
+    const Quad difference = real - (1 - cosine * cosine);
+    const Quad size = QUAD_CALL(sqrt)(difference * difference + imaginary * imaginary);
+    const Quad q_real = QUAD_CALL(sqrt)((size + difference) / 2),
+               q_imaginary = QUAD_CALL(sqrt)((size - difference) / 2);
+    Quad sum = 0;
+    for (int along = 0; along < 2; along++) {
+        const Quad a = along ? real * cosine : cosine, b = along ? imaginary * cosine : 0;
+        sum += ((a - q_real) * (a - q_real) + (b - q_imaginary) * (b - q_imaginary)) /
+               ((a + q_real) * (a + q_real) + (b + q_imaginary) * (b + q_imaginary));
+    }
+    return (double)(sum / 2);
 }
 
 // Returns whether a bounced ray stays on its side of the surface, that of the normal or the other. If a
