@@ -36,11 +36,10 @@ static inline double roundoff_of(const Rounding *rounding) // half an ulp of 1
     return (rounding->is_double ? DBL_EPSILON : FLT_EPSILON) / 2;
 }
 
-Quad3 exact_from_eye(const Rounding *rounding, Vector3 point);
-// Returns a rounded point of a plane that is off the plane by at most some ulp of the plane's distance from
-// the eye: the given one or, if that is too far away, the one nearest to the eye. In double without an eye,
-// returns the given one unrounded.
-Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal);
+static inline Quad3 exact_from_eye(const Rounding *rounding, Vector3 point)
+{
+    return quad3_subtract(quad3(point), quad3(rounding->eye));
+}
 
 // Returns the same direction, scaled exactly by a power of two so that its largest component lies in 1/2..1.
 static inline Vector3 axis_scaled(Vector3 axis)
@@ -59,4 +58,8 @@ static inline Vector3 axis_scaled(Vector3 axis)
 }
 
 // Returns a plane's normal, not unit, with one over its length in w.
-scalar4 normal_and_inverse_length(const Rounding *rounding, Vector3 normal);
+static inline scalar4 normal_and_inverse_length(const Rounding *rounding, Vector3 normal)
+{
+    const Vector3 scaled = vector_rounded(rounding, axis_scaled(normal));
+    return scalar4_of(scaled, 1 / vector_length(scaled));
+}
