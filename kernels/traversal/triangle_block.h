@@ -9,10 +9,10 @@
 //
 // Let L be the length of (u, v, 1), D the longest edge, W the distance from the common origin to the farther
 // of the vertices and the ray's start, S that from the start to the vertices, and u also the unit roundoff.
-// Across the ray the full test is off by 23 u S: its vectors across the ray by 7 u, or 17 u with a root off
-// by 3 ulp, a difference and a product by 6 u. The block is off by 13 u W: vertices minus origin, the line,
-// which misses the origin, and slopes by 9 u, a x (b - a) and its sums by 4 u over the edge's length. A
-// vertex is thus off by less than q = 24 u S + 16 u W, and an edge value by E = L D q:
+// Across the ray the full test is off by 8.8 u S, or 18.4 u S with a root off by 3 ulp (docs/numerics.md).
+// The block is off by 13 u W: vertices minus origin, the line, which misses the origin, and slopes by 9 u,
+// a x (b - a) and its sums by 4 u over the edge's length. A vertex is thus off by less than
+// q = 24 u S + 16 u W, and an edge value by E = L D q:
 // - The full test is exact for vertices within q. No value of a hit is below -E, and all above E hit.
 // - Values inside have the sign of the volume a x (b - a) . c, which is rounded by 8 u of 12 u W^2 D. At a
 //   point w d + e of the triangle, |e| <= q, the volume is w n . d + n . e. If its sign is uncertain and
