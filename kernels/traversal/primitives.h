@@ -148,7 +148,7 @@ static inline Sphere block_sphere(const Scene *scene, global const SphereBlock *
 }
 
 // Returns those of the first `count` spheres of a block, as bits, that one ray may hit. Rejects by the first
-// step of the full test, at `certified` with radii enlarged by all that it counts as uncertain.
+// step of the full test, at `certified` with radii enlarged by the exact ray's error and all roundings.
 static inline uint block_spheres_near(global const SphereBlock *block, uint count, const Ray *ray, uint lane)
 {
     const Vector origin = vector_of_lane(&ray->origin, lane),
