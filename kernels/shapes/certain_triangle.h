@@ -30,9 +30,9 @@ static inline TriangleSizes triangle_sizes(const Triangle *triangle)
 #define VERTEX_ROUNDING ((real)(1.05f))
 // sqrt(3), rounded up, which bounds the length of a normal whose components are at most 1.
 #define STORED_NORMAL_LENGTH ((real)(1.7321f))
-// The edge functions of a triangle that is hit are off by at most EDGE_FIRST_ORDER A D p + EDGE_SECOND_ORDER
-// p^2, for the longest edge D, the error p of vertices, and a bound A on the frame's vectors, whose norm is
-// below 1.23 A (docs/numerics.md).
+// The edge functions of a triangle that is hit are off by at most EDGE_FIRST_ORDER A D P + EDGE_SECOND_ORDER
+// P^2, for the longest edge D, the error P of the vertices' coordinates in the frame, and a bound A on the
+// frame's vectors, whose norm is below 1.23 A (docs/numerics.md).
 #define EDGE_FIRST_ORDER  3.5f
 #define EDGE_SECOND_ORDER 24
 // Weights are off by the errors of all edge functions and by as much of the determinant's, over at least 7/8
