@@ -78,7 +78,8 @@ static inline real vector_norm(Vector a)
     return real_sqrt(vector_dot(a, a));
 }
 
-// Returns the unit vector within 2.5 u. The zero vector stays zero.
+// Returns the unit vector within 4.5 u where quotients and roots are correctly rounded: 1.5 u for the dot
+// product's root and u each for root, quotient and product. The zero vector stays zero.
 static inline Vector vector_normalize(Vector a)
 {
     real norm = vector_norm(a);
