@@ -43,7 +43,8 @@ static void superellipsoid_flatten(Flattening *flattening, const Object *object)
         condition += length * vector_length(axes[i]);
         shape.rows[i] = scalar4_of(vector_rounded(rounding, quad3_rounded(row)), length * above);
     }
-    // hits lie in the box (docs/numerics.md)
+    // Hits lie in the box: the roundings of q move them by less than 7 u times this, and those of f by less
+    // than u.
     half = vector_add(half, vector_all(few * condition * radius));
     shape.extent = scalar4_of(half, 0.5 * condition * radius);
     primitive_add(flattening, TYPE_SUPERELLIPSOIDS, &shape, object->material);
