@@ -124,6 +124,11 @@ const char *text_plural(uint64_t count)
     return count == 1 ? "" : "s";
 }
 
+const char *text_is_are(uint64_t count)
+{
+    return count == 1 ? "is" : "are";
+}
+
 // Implements the Unicode Standard 15.0, table 3-7.
 size_t text_character_size(const char *text, size_t length)
 {

@@ -48,6 +48,8 @@ ShortText text_duration(double seconds);
 ShortText text_number(double value, int digits_min);
 // Returns the plural ending of a noun for the count, "" for 1 and otherwise "s".
 const char *text_plural(uint64_t count);
+// Returns "is" for 1 and otherwise "are".
+const char *text_is_are(uint64_t count);
 
 // Returns whether the first byte ends a line, as a newline or a carriage return without a newline after it.
 static inline bool text_ends_line(const char *text, size_t length)
