@@ -65,6 +65,7 @@ static bool shader_mode_read(DatReader *reader)
 {
     double unused;
     const Word quality = value_word(&reader->line);
+    reader->last_colored = (ColoredMaterial){0}; // its texture's text may have another meaning from now on
     if (!word_is_in_any_case(quality, "full"))
         dat_warn(reader, quality.offset,
                  "shader mode '%.*s' leaves something out, such as shadows: shown in full",

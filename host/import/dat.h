@@ -5,10 +5,18 @@
 #include "host/import/line.h"
 #include "host/import/load.h"
 
+// The material of triangles that have a texture, by its text, and a color.
+typedef struct {
+    Word texture;
+    Color color;
+    uint32_t index; // of the scene
+} ColoredMaterial;
+
 typedef struct {
     Report report;
     Line line;
     Scene *scene;
+    ColoredMaterial last_colored; // `texture.text` is NULL if there is none
     bool has_resolution, has_camera;
     bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
     void *textures;  // by their names, as tsearch keeps them

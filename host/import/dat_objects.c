@@ -205,15 +205,24 @@ static Color mean_color(DatReader *reader, size_t offset, const Color *a, const 
     return vector_max(vectors_equal(*a, *b) && vectors_equal(*a, *c) ? *a : mean, vector_all(0));
 }
 
-// Adds a material of the given color unless the last material has it. Returns its index.
-static uint32_t material_of_color(DatReader *reader, Material material, Color color)
+// Adds a texture's material with another color, unless the last such material is the same. Returns its index.
+static uint32_t colored_material_add(DatReader *reader, Word texture, Material material, Color color)
 {
-    Scene *scene = reader->scene;
+    ColoredMaterial *last = &reader->last_colored;
+    if (last->texture.text && words_equal(last->texture, texture) && vectors_equal(last->color, color))
+        return last->index;
     material.color = color;
-    const size_t count = scene->materials.count;
-    if (count > 0 && memcmp(&scene->materials.items[count - 1], &material, sizeof material) == 0)
-        return (uint32_t)count - 1;
-    return scene_add_material(scene, &material, "");
+    *last = (ColoredMaterial){texture, color, scene_add_material(reader->scene, &material, "")};
+    return last->index;
+}
+
+// Reads the definition of a texture and sets *text to it.
+static bool texture_text_read(DatReader *reader, Word *text, Material *material)
+{
+    const size_t offset = value_peek(&reader->line).offset;
+    if (!dat_texture_body(reader, material)) return false;
+    *text = (Word){reader->line.text + offset, offset, line_offset(&reader->line) - offset};
+    return true;
 }
 
 bool dat_colored_triangle(DatReader *reader)
@@ -223,13 +232,14 @@ bool dat_colored_triangle(DatReader *reader)
     Object object = {.type = SHAPE_TRIANGLE};
     Color colors[3];
     Material material;
+    Word texture;
     if (!vertices_read(reader, &object) || !normals_read(reader, &object)) return false;
     for (int i = 0; i < 3; i++)
         if (!dat_expect(reader, names[i]) || !line_vector(&reader->line, names[i], NULL, &colors[i]))
             return false;
-    if (!dat_texture_body(reader, &material)) return false;
+    if (!texture_text_read(reader, &texture, &material)) return false;
     const Color color = mean_color(reader, offset, &colors[0], &colors[1], &colors[2]);
-    object.material = material_of_color(reader, material, color);
+    object.material = colored_material_add(reader, texture, material, color);
     array_push(reader->scene->objects, object);
     return true;
 }
@@ -238,6 +248,7 @@ bool dat_colored_triangle(DatReader *reader)
 typedef struct {
     Mesh mesh;
     Color *colors; // one for each vertex, or NULL
+    Word texture;  // of the material
     Material material;
     uint32_t material_index;
     struct {
@@ -269,9 +280,9 @@ static void array_triangle_add(DatReader *reader, VertexArray *array, const uint
 {
     uint32_t material = array->material_index;
     if (array->colors)
-        material = material_of_color(reader, array->material,
-                                     mean_color(reader, offset, &array->colors[corners[0]],
-                                                &array->colors[corners[1]], &array->colors[corners[2]]));
+        material = colored_material_add(reader, array->texture, array->material,
+                                        mean_color(reader, offset, &array->colors[corners[0]],
+                                                   &array->colors[corners[1]], &array->colors[corners[2]]));
     array_reserve(array->triangles, 1);
     memcpy(array->triangles.items[array->triangles.count++], corners, sizeof *array->triangles.items);
     array_push(array->materials, material);
@@ -328,7 +339,7 @@ static bool array_parts_read(DatReader *reader, VertexArray *array)
             array->colors = vectors_read(reader, "colors", count, true);
             if (!array->colors) return false;
         } else if (dat_skip(reader, "texture")) {
-            if (!dat_texture_body(reader, &array->material)) return false;
+            if (!texture_text_read(reader, &array->texture, &array->material)) return false;
             array->material_index = scene_add_material(reader->scene, &array->material, "");
         } else if (dat_skip(reader, "tristrip")) {
             if (!faces_read(reader, array, true)) return false;
@@ -343,7 +354,7 @@ static bool array_parts_read(DatReader *reader, VertexArray *array)
 
 bool dat_vertex_array(DatReader *reader)
 {
-    VertexArray array = {.material = dat_texture_default()};
+    VertexArray array = {.texture.text = "", .material = dat_texture_default()};
     array.material_index = scene_add_material(reader->scene, &array.material, "");
     const bool read = array_parts_read(reader, &array);
     array.mesh.triangles = array.triangles.items;
