@@ -155,7 +155,7 @@ class Cutouts(TestCase):
                 "  {sphere: {center: [0, 0, 800], radius: 1, material: {transmission: 0.8}}}, {mesh: {file: ")
         hole_png("gray.png", 0)
         write("named.obj", "mtllib a.mtl\nusemtl m\n" + QUAD)
-        blends = "the alpha of '{}' does not blend: below 0.5 the surface is cut out"
+        blends = "the alpha of '{}' does not blend; the surface is cut out where it is below 0.5"
 
         def objects(mesh, *warnings, material=""):
             write("scene.yaml", f"{head}{mesh}{material}}}}}, {{{UNSEEN}}}]\n")
@@ -178,7 +178,7 @@ class Cutouts(TestCase):
             write("a.mtl", "newmtl m\n" + lines)
             self.assertEqual(objects("named.obj", *warnings), expected, lines)
         write("a.mtl", "newmtl m\nmap_Kd half.png\nmap_d missing.png\n")
-        missing = "cannot read 'missing.png': No such file or directory: nothing is cut out"
+        missing = "cannot read 'missing.png': No such file or directory; nothing is cut out"
         self.assertGreater(sum(objects("named.obj", missing, "the alpha of 'half.png' is ignored")), sum(expected))
         for options, warnings in [
             ({"alphaMode": "MASK"}, []),
@@ -196,7 +196,7 @@ class Cutouts(TestCase):
         plain = "  - mesh: {file: quad.obj, material: {image: hole.png}}\n"
         for objects, count in (opaque, 0), (opaque + plain, 1), (plain + opaque, 1):
             stderr = self.glint(f"check {write('scene.yaml', head + objects)}").stderr
-            self.assertEqual(stderr.count("the alpha of 'hole.png' is ignored: its transparent parts are opaque"), count, stderr)
+            self.assertEqual(stderr.count("the alpha of 'hole.png' is ignored, so its transparent parts are opaque"), count, stderr)
             self.assertEqual(stderr.count("alpha"), count, stderr)
         cut = "  - mesh: {file: quad.obj, material: {image: hole.png, cutout: 0.5}}\n"
         self.assertNotIn("alpha", self.glint(f"check {write('scene.yaml', head + cut + opaque)}").stderr)
@@ -217,7 +217,7 @@ class Cutouts(TestCase):
         write("half.yaml", scene % "half")
         write("opaque.yaml", scene % "opaque")
         self.glint("check half.yaml")
-        self.assertIn("the alpha of 'opaque.png' is 1 everywhere: nothing is cut out", self.glint("check opaque.yaml").stderr)
+        self.assertIn("the alpha of 'opaque.png' is 1 everywhere, so nothing is cut out", self.glint("check opaque.yaml").stderr)
         self.refuses("render half.yaml -o a.npy --precision certified", "a material has a 'cutout', which has no error bound")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.glint("certify opaque.yaml --size 4x4" + (" --precision single" if not IS_LONG else ""))

@@ -190,7 +190,7 @@ TEST(polygons_that_cannot_be_filled_are_reported)
         scene_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n", false);
     assert_string_equal(
         text_c(&got),
-        "4:18: warning: a.obj: triangles without area, which are never hit: 2\n"
+        "4:18: warning: a.obj: 2 triangles have no area and are never hit\n"
         "4:18: warning: a.obj: 1 polygon intersects itself or is far from planar; only parts are filled\n");
 }
 
@@ -199,18 +199,19 @@ TEST(scene_file_faults_are_reported)
     file_write("a.obj", square);
 #define REFUSED(mesh, expected)                                                                              \
     assert_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: " mesh "\n", expected)
-    REFUSED("{file: none.obj}", "4:18: error: none.obj: No such file or directory\n");
+    REFUSED("{file: none.obj}", "4:18: error: none.obj: cannot read the file: No such file or directory\n");
     REFUSED("{file: a.mtl}",
-            "4:18: error: a.mtl: no mesh that is known by its ending: .obj, .ply, .stl, .gltf, "
-            ".fbx, .dae, …\n");
+            "4:18: error: a.mtl: a mesh's name must have a known ending, such as .obj, .ply, .stl, "
+            ".gltf, .fbx or .dae\n");
     REFUSED("{file: [1]}", "4:18: error: 'file' must be the name of a file, not a list of 1\n");
-    REFUSED("{smooth: true}", "4:11: error: mesh lacks 'file'\n");
+    REFUSED("{smooth: true}", "4:11: error: the mesh lacks 'file'\n");
     REFUSED("{file: a.obj, smooth: 1}", "4:33: error: 'smooth' must be true or false, not '1'\n");
     REFUSED("{file: a.obj, transform: {scale: [1, 0, 1]}}", "4:44: error: 'scale' must not be zero\n");
     REFUSED("{file: a.obj, transform: {rotate: 90}}",
             "4:45: error: 'rotate' must be three numbers, not '90'\n");
-    REFUSED("{file: a.obj, transform: {turn: 90}}",
-            "4:37: error: unknown transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
+    REFUSED(
+        "{file: a.obj, transform: {turn: 90}}",
+        "4:37: error: there is no transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
 }
 
 TEST(ids_count_the_triangles)
@@ -272,7 +273,7 @@ TEST(triangles_without_area_are_never_hit)
         text_appendf(&source, CAMERA_AND_LIGHT "objects:\n%s", objects);
         assert_true(scene_read_text(&scene, "scene.yaml", &source, false, &messages));
         assert_int_equal(messages.count, 1);
-        assert_non_null(strstr(messages.items[0].text, "a.obj: triangles without area"));
+        assert_non_null(strstr(messages.items[0].text, "no area and"));
         assert_true(probe_trace(&scene, precision, 0, rays, GRID * GRID, hits));
         scene_free(&scene);
 

@@ -115,27 +115,33 @@ TEST(faults_name_file_and_vertex)
         const char *name, *text, *message;
     } cases[] = {
         {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n",
-         "4:18: warning: a.obj: faces of one or two corners are not shown\n4:18: error: a.obj: no triangles"},
-        {"a.ply", PLY_OF("nan", "2"), "12:3: error: 'nan' is not a coordinate: a number up to 1e+30"},
-        {"a.ply", PLY_OF("1", "7"), "13:8: error: a face names vertex 7 (from 0); there are 3"},
-        {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"), "15:11: error: face 1 (from 0) names vertex -1"},
+         "4:18: warning: a.obj: faces of one or two corners are not shown\n4:18: error: a.obj: the mesh has "
+         "no triangles"},
+        {"a.ply", PLY_OF("nan", "2"),
+         "12:3: error: a coordinate must be a number of at most 1e+30 in magnitude, not 'nan'"},
+        {"a.ply", PLY_OF("1", "7"),
+         "13:8: error: a face names vertex 7 (counted from 0), but the file has only 3"},
+        {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"),
+         "15:11: error: face 1 (counted from 0) names vertex -1, which cannot exist"},
         {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 400000000"),
-         "15:18: error: a face names vertex 400000000 (from 0); there are 4"},
+         "15:18: error: a face names vertex 400000000 (counted from 0), but the file has only 4"},
         {"a.ply", PLY_OF_FACES("5 0 1 3 2 400000000", "3 0 1 2"),
-         "14:20: error: a face names vertex 400000000 (from 0); there are 4"},
+         "14:20: error: a face names vertex 400000000 (counted from 0), but the file has only 4"},
         {"a.ply", PLY_OF_FACES("0", "2 0 1"),
-         "4:18: warning: a.ply: faces of one or two corners are not shown\n4:18: error: a.ply: no triangles"},
-        {"a.ply", PLY_HEADER("3", "1"), "9:1: error: the header lacks its end, a line 'end_header'"},
+         "4:18: warning: a.ply: faces of one or two corners are not shown\n4:18: error: a.ply: the mesh has "
+         "no triangles"},
+        {"a.ply", PLY_HEADER("3", "1"), "9:1: error: the header lacks a line 'end_header'"},
         {"a.ply", PLY_HEADER("3", "1") "end_header too\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-         "14:1: error: the header lacks its end, a line 'end_header'"},
+         "14:1: error: the header lacks a line 'end_header'"},
         {"a.ply", PLY_HEADER("99999999", "1") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-         "13:7: warning: words after the last property of a row are not used\n"
-         "14:1: error: the file ends before vertex 4 (from 0) of 99999999"},
+         "13:7: warning: words after the last property of a row are ignored\n"
+         "14:1: error: the file ends before vertex 4 (counted from 0) of 99999999"},
         {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
          "9:9: error: the header declares 'face' twice"},
         {"a.gltf", "{", "1:1: error: string or '}' expected near end of file"},
         {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n",
-         "4:18: error: a.off: vertex 2 (from 0) is not finite or too large"},
+         "4:18: error: a.off: vertex 2 (counted from 0) has a coordinate that is not a number of at most "
+         "1e+30 in magnitude"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
@@ -256,12 +262,12 @@ TEST(child_is_limited)
     static const struct {
         const char *name, *reason;
     } cases[] = {
-        {"crash.fbx", "assimp crashed while reading it"},
-        {"silent.fbx", "assimp failed while reading it"},
-        {"garbage.fbx", "assimp failed while reading it"},
-        {"hang.fbx", "assimp needs more than 60 s of processor time to read it"},
-        {"wait.fbx", "assimp needs more than 120 s to read it"},
-        {"bloat.fbx", "assimp needs more than 4096 MiB to read it"},
+        {"crash.fbx", "assimp crashed while reading the file"},
+        {"silent.fbx", "assimp failed while reading the file"},
+        {"garbage.fbx", "assimp failed while reading the file"},
+        {"hang.fbx", "assimp needs more than 60 s of processor time to read the file"},
+        {"wait.fbx", "assimp needs more than 120 s to read the file"},
+        {"bloat.fbx", "assimp needs more than 4096 MiB to read the file"},
     };
     void (*const on_processor)(int) = signal(SIGXCPU, SIG_IGN),
                  (*const on_alarm)(int) = signal(SIGALRM, SIG_IGN);

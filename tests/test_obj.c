@@ -147,13 +147,15 @@ TEST(opacity_is_dissolve)
         {"Tr 0.75\nd 0.25\n", "", 0.25, 0.125, 0.75, 1.5},
         {"d 0.25\nTr 0.25\n", "a.mtl:6:4: warning: Tr 0.25 contradicts d 0.25 (Tr = 1 - d); d is used\n",
          0.25, 0.125, 0.75, 1.5},
-        {"d -halo 0.25\n", "a.mtl:5:3: warning: '-halo' is not used\n", 0.25, 0.125, 0.75, 1.5},
+        {"d -halo 0.25\n", "a.mtl:5:3: warning: '-halo' is not supported and is ignored\n", 0.25, 0.125, 0.75,
+         1.5},
         {"d 0.25\nillum 2\n", "", 0.25, 0.125, 0.75, 1},
         {"illum 9\nd 0.25\n", "", 0.25, 0.5, 0.75, 1},
         {"illum 7\nd 0.25\n", "a.mtl:5:7: warning: the reflections of illum 3 to 8 are not shown\n", 0.25,
          0.5, 0.75, 1.5},
-        {"illum 9\n", "a.mtl:5:7: warning: illum 9 is for glass, but d and Tr are missing: opaque\n", 1, 0.5,
-         0, 1.5},
+        {"illum 9\n",
+         "a.mtl:5:7: warning: illum 9 is for glass, but d and Tr are missing; the material is opaque\n", 1,
+         0.5, 0, 1.5},
     };
     file_write("a.ppm", "P3 1 1 255 255 0 0\n");
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
@@ -173,14 +175,15 @@ TEST(opacity_is_dissolve)
 TEST(invalid_numbers_become_defaults)
 {
     file_write("a.mtl", "newmtl red\nKd -1 0 0\nNi 0\nNs -5\nd 7\nKs 0 -2\nillum 11\nTr -1\n");
-    OwnedScene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
-                                    "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n"
-                                    "a.mtl:3:4: warning: must be greater than 0, not 0: the default is used\n"
-                                    "a.mtl:4:4: warning: must be 0 or more, not -5: the default is used\n"
-                                    "a.mtl:5:3: warning: must be from 0 to 1, not 7: the default is used\n"
-                                    "a.mtl:6:6: warning: must be 0 or more, not -2: the default is used\n"
-                                    "a.mtl:7:7: warning: must be from 0 to 10, not 11: the default is used\n"
-                                    "a.mtl:8:4: warning: must be from 0 to 1, not -1: the default is used\n");
+    OwnedScene scene =
+        scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
+                     "a.mtl:2:4: warning: 'Kd' must be 0 or more, not -1; the default is used\n"
+                     "a.mtl:3:4: warning: 'Ni' must be greater than 0, not 0; the default is used\n"
+                     "a.mtl:4:4: warning: 'Ns' must be 0 or more, not -5; the default is used\n"
+                     "a.mtl:5:3: warning: 'd' must be from 0 to 1, not 7; the default is used\n"
+                     "a.mtl:6:6: warning: 'Ks' must be 0 or more, not -2; the default is used\n"
+                     "a.mtl:7:7: warning: 'illum' must be from 0 to 10, not 11; the default is used\n"
+                     "a.mtl:8:4: warning: 'Tr' must be from 0 to 1, not -1; the default is used\n");
     const Material *red = triangle_material(&scene, 0);
     assert_vector(red->color, 1, 1, 1);
     assert_number(red->shininess, material_default().shininess);
@@ -197,7 +200,7 @@ TEST(materials_are_those_of_their_faces)
     Scene scene = scene_of_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nmtllib a.mtl\nusemtl red "
                                "one\nf 1 2 3\nf 1 2 3 4\nusemtl gray\n"
                                "usemtl clear\nf 1 2 3\nusemtl gray\nf 1 2 3 4\nf 1 2 3\nmtllib b c.mtl\n",
-                               "a.mtl:1:1: warning: a line before the first newmtl is not used\n");
+                               "a.mtl:1:1: warning: a line before the first newmtl is ignored\n");
     static const double reds[] = {1, 1, 1, 1, 1, 0, 0.5, 0.5, 0.5},
                         greens[] = {1, 1, 0, 0, 0, 2, 0.5, 0.5, 0.5};
     assert_int_equal(scene.meshes.items[0].triangle_count, COUNT_OF(reds));
@@ -239,29 +242,29 @@ TEST(missing_materials_are_reported)
     assert_vector(triangle_material(&scene, 1)->color, 0, 0, 1);
     scene_free(&scene);
     scene = scene_of_obj("mtllib D:\\x\\d.mtl\nusemtl blue\n" FACE,
-                         "a.obj:1:8: warning: no 'D:\\x\\d.mtl': 'd.mtl' is used\n");
+                         "a.obj:1:8: warning: 'D:\\x\\d.mtl' does not exist; 'd.mtl' is used\n");
     assert_vector(triangle_material(&scene, 0)->color, 0, 0, 1);
     scene_free(&scene);
     // read once, however often it is named
     file_write("a.mtl", "newmtl red\nKd 1 0 0\nPr 1\n");
     scene = scene_of_obj("mtllib a.mtl\nmtllib ./a.mtl\nmtllib missing.mtl\nusemtl red\n" FACE,
-                         "a.mtl:3:1: warning: 'Pr' is not used\n");
+                         "a.mtl:3:1: warning: 'Pr' is not supported and is ignored\n");
     scene_free(&scene);
     // what might wait or never end is not read
     unlink("a.mtl");
     assert_int_equal(symlink("/dev/null", "a.mtl"), 0);
     scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
-                         "a.obj:1:8: warning: the material file 'a.mtl' cannot be read: the default material "
+                         "a.obj:1:8: warning: the material file 'a.mtl' cannot be read; the default material "
                          "is used\n");
     scene_free(&scene);
     unlink("a.mtl");
     scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE,
-                         "a.obj:1:8: warning: the material file 'missing.mtl' cannot be read: the default "
+                         "a.obj:1:8: warning: the material file 'missing.mtl' cannot be read; the default "
                          "material is used\n");
     assert_vector(triangle_material(&scene, 0)->color, 1, 1, 1);
     scene_free(&scene);
     scene = scene_of_obj("mtllib d.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\nusemtl red\nf 1 2 3\n",
-                         "a.obj:2:8: warning: 'red' is in no material file: the default is used\n");
+                         "a.obj:2:8: warning: 'red' is in no material file; the default material is used\n");
     assert_vector(triangle_material(&scene, 1)->color, 0, 0, 1);
     assert_vector(triangle_material(&scene, 2)->color, 1, 1, 1);
     scene_free(&scene);
@@ -271,9 +274,10 @@ TEST(the_last_material_of_a_name_is_used)
 {
     file_write("a.mtl", "newmtl red\nKd 0.5 0 0\nnewmtl blue\nKd 0 0 1\nnewmtl red\nKd 1 0 0\nnewmtl re\n");
     file_write("b.mtl", "newmtl reddish\nnewmtl blue\nKd 0 0 0.5\n");
-    OwnedScene scene = scene_of_obj("mtllib a.mtl b.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\n",
-                                    "a.mtl:5:8: warning: material 'red' is given twice: the last is used\n"
-                                    "b.mtl:2:8: warning: material 'blue' is given twice: the last is used\n");
+    OwnedScene scene =
+        scene_of_obj("mtllib a.mtl b.mtl\nusemtl red\n" FACE "usemtl blue\nf 1 2 3\n",
+                     "a.mtl:5:8: warning: material 'red' is given twice; the last one is used\n"
+                     "b.mtl:2:8: warning: material 'blue' is given twice; the last one is used\n");
     assert_vector(triangle_material(&scene, 0)->color, 1, 0, 0);
     assert_vector(triangle_material(&scene, 1)->color, 0, 0, 0.5);
 }
@@ -295,38 +299,44 @@ TEST(images_of_materials_are_used)
     assert_vector(same->diffuse, 1, 1, 1);
     scene_free(&scene);
 
-    scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
-                         "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
-                         "material 'red'\n");
+    scene = scene_of_obj(
+        "mtllib a.mtl\nusemtl red\n" FACE,
+        "scene.yaml:4:18: warning: a.obj: the mesh has no texture coordinates for the image './a.ppm' of "
+        "material 'red'; the material's color is used\n");
     assert_int_equal(triangle_material(&scene, 0)->image.texture, 0);
     assert_vector(triangle_material(&scene, 0)->color, 0.75, 0.5, 0.25);
     scene_free(&scene);
-    scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "f 1/1 2/2 3/3\n",
-                         "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
-                         "material 'red'\n"
-                         "a.obj:6:13: warning: a face names texture coordinate 3 (from 1); there are 0: not "
-                         "used\n");
+    scene = scene_of_obj(
+        "mtllib a.mtl\nusemtl red\n" CORNERS "f 1/1 2/2 3/3\n",
+        "scene.yaml:4:18: warning: a.obj: the mesh has no texture coordinates for the image './a.ppm' of "
+        "material 'red'; the material's color is used\n"
+        "a.obj:6:13: warning: a face names texture coordinate 3 (counted from 1), but the file has only 0; "
+        "it "
+        "is ignored\n");
     assert_int_equal(triangle_material(&scene, 0)->image.texture, 0);
     scene_free(&scene);
 
     static const struct {
         const char *mtl, *expected;
     } cases[] = {
-        {"map_Kd none.png\n",
-         "a.mtl:2:8: warning: cannot read 'none.png': No such file or directory: the color is used\n"},
+        {"map_Kd none.png\n", "a.mtl:2:8: warning: cannot read 'none.png': No such file or directory; the "
+                              "material's color is used\n"},
         {"map_Kd /dev/null\n",
-         "a.mtl:2:8: warning: cannot read '/dev/null': not a regular file: the color is used\n"},
-        {"map_Kd a.tga\n", "a.mtl:2:8: warning: 'a.tga' is not a PNG, JPEG, PPM or EXR: the color is used\n"},
-        {"map_Kd C:\\Users\\me\\a.ppm\n", "a.mtl:2:8: warning: no 'C:\\Users\\me\\a.ppm': 'a.ppm' is used\n"},
-        {"map_Kd /home/me/a.ppm\n", "a.mtl:2:8: warning: no '/home/me/a.ppm': 'a.ppm' is used\n"},
-        {"map_Kd C:/none.png\n",
-         "a.mtl:2:8: warning: cannot read 'C:/none.png': No such file or directory: the color is used\n"},
-        {"map_Kd -s 2 2 1 -clamp on -bm 3 a.ppm\n", "a.mtl:2:8: warning: options of textures are not used\n"},
+         "a.mtl:2:8: warning: cannot read '/dev/null': not a regular file; the material's color is used\n"},
+        {"map_Kd a.tga\n",
+         "a.mtl:2:8: warning: 'a.tga' is not a PNG, JPEG, PPM or EXR; the material's color is used\n"},
+        {"map_Kd C:\\Users\\me\\a.ppm\n",
+         "a.mtl:2:8: warning: 'C:\\Users\\me\\a.ppm' does not exist; 'a.ppm' is used\n"},
+        {"map_Kd /home/me/a.ppm\n", "a.mtl:2:8: warning: '/home/me/a.ppm' does not exist; 'a.ppm' is used\n"},
+        {"map_Kd C:/none.png\n", "a.mtl:2:8: warning: cannot read 'C:/none.png': No such file or directory; "
+                                 "the material's color is used\n"},
+        {"map_Kd -s 2 2 1 -clamp on -bm 3 a.ppm\n",
+         "a.mtl:2:8: warning: the options of textures are ignored\n"},
         {"map_bump -bm 3 none.png\n",
-         "a.mtl:2:16: warning: cannot read 'none.png': No such file or directory: normals are not tilted\n"},
+         "a.mtl:2:16: warning: cannot read 'none.png': No such file or directory; normals are not tilted\n"},
         {"norm a.ppm\n", ""},
         {"map_Bump -bm 9 a.ppm\nnorm a.ppm\n",
-         "a.mtl:3:6: warning: a second map of normals or heights: it replaces the first\n"},
+         "a.mtl:3:6: warning: a second normal or height map replaces the first\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.mtl", formatted("newmtl red\n%s", cases[i].mtl));
@@ -351,7 +361,7 @@ TEST(bumps_are_normals)
                                       : i == 0 ? "map_Bump"
                                                : "bump"));
         OwnedScene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n",
-                                        i == 3 ? "a.mtl:3:6: warning: a second map of normals or heights: it "
+                                        i == 3 ? "a.mtl:3:6: warning: a second normal or height map "
                                                  "replaces the first\n"
                                                : "");
         const Material *red = triangle_material(&scene, 0);
@@ -379,23 +389,23 @@ TEST(what_is_not_used_is_reported_once)
         "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 abc\nvt nan 0\nvt 0 1e31\nvn 0 inf "
         "0 abc\n"
         "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
-        "scene.yaml:4:18: warning: a.obj: texture coordinates that are not finite or too large, "
-        "read as 0: 2\n"
-        "scene.yaml:4:18: warning: a.obj: normals that are not finite or too large, not used: 1\n"
-        "a.mtl:2:4: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:3:6: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:4:4: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:5:2: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:6:4: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:7:4: warning: must be 0 or more, not -1: the default is used\n"
-        "a.mtl:8:4: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:9:1: warning: 'map_refl' is not used\n"
-        "a.mtl:13:1: warning: 'Pr' is not used\n"
-        "a.obj:3:11: warning: colors of vertices are not used\n"
-        "a.obj:5:9: warning: words after the last number of a row are not used\n"
-        "a.obj:10:1: warning: 'l' is not used\n"
-        "a.obj:11:1: warning: 'p' is not used\n"
-        "a.obj:13:1: warning: 'cstype' is not used\n");
+        "a.mtl:2:4: warning: 'Kd' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:3:6: warning: 'Ks' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:4:4: warning: 'Ns' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:5:2: warning: 'd' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:6:4: warning: 'Ni' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:7:4: warning: 'Ke' must be 0 or more, not -1; the default is used\n"
+        "a.mtl:8:4: warning: 'Tf' must be a number of at most 1e+30 in magnitude; the default is used\n"
+        "a.mtl:9:1: warning: 'map_refl' is not supported and is ignored\n"
+        "a.mtl:13:1: warning: 'Pr' is not supported and is ignored\n"
+        "scene.yaml:4:18: warning: a.obj: 2 texture coordinates are not finite or too large "
+        "and are read as 0\n"
+        "scene.yaml:4:18: warning: a.obj: 1 normal is not finite or too large and is ignored\n"
+        "a.obj:3:11: warning: vertex colors are ignored; the material's color is used\n"
+        "a.obj:5:9: warning: words after the last number of a row are ignored\n"
+        "a.obj:10:1: warning: 'l' is not supported and is ignored\n"
+        "a.obj:11:1: warning: 'p' is not supported and is ignored\n"
+        "a.obj:13:1: warning: 'cstype' is not supported and is ignored\n");
     const Material *red = triangle_material(&scene, 0);
     assert_vector(red->color, 1, 1, 1);
     assert_number(red->specular.largest, 0);
@@ -412,19 +422,28 @@ TEST(missing_parts_are_dropped)
         bool has_uvs, has_normals;
     } cases[] = {
         {CORNERS "vn 0 0 1\nf 1//1 2//1 3//2\nf 1//1 2//3 3//2\n",
-         "a.obj:6:11: warning: a face names normal 3 (from 1); there are 1: not used\n", false, true},
+         "a.obj:6:11: warning: a face names normal 3 (counted from 1), but the file has only 1; it is "
+         "ignored\n",
+         false, true},
         {CORNERS "vn 0 0 1\nf 1//1 2//0 3//-2\n",
-         "a.obj:5:11: warning: a face names normal 0; there are 1 before it: not used\n", false, true},
+         "a.obj:5:11: warning: a face names normal 0, but the file has only 1 before the face; it is "
+         "ignored\n",
+         false, true},
         {CORNERS "vn 0 0 1\nf 1//0 2//0 3//0\n",
-         "a.obj:5:6: warning: a face names normal 0; there are 1 before it: not used\n", false, false},
+         "a.obj:5:6: warning: a face names normal 0, but the file has only 1 before the face; it is "
+         "ignored\n",
+         false, false},
         {CORNERS "f 1/1 2/2 3/99999999999\n",
-         "a.obj:4:9: warning: a face names texture coordinate 2 (from 1); there are 0: not used\n"
-         "a.obj:4:13: warning: a face names texture coordinate 99999999999; there are 0 before it: not "
-         "used\n",
+         "a.obj:4:13: warning: a face names texture coordinate 99999999999, but the file has only 0 before "
+         "the face; it "
+         "is ignored\n"
+         "a.obj:4:9: warning: a face names texture coordinate 2 (counted from 1), but the file has only 0; "
+         "it is ignored\n",
          false, false},
         {CORNERS "vt 0 0\nf 1/1 2/2 3/1\n",
-         "a.obj:5:9: warning: a face names texture coordinate 2 (from 1); there are 1: not used\n", true,
-         false},
+         "a.obj:5:9: warning: a face names texture coordinate 2 (counted from 1), but the file has only 1; "
+         "it is ignored\n",
+         true, false},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         OwnedScene scene = scene_of_obj(cases[i].obj, cases[i].expected);
@@ -445,12 +464,13 @@ TEST(files_have_each_message_once)
     for (int i = 0; i < 29; i++)
         text_appendf(&scene_text, "  - mesh: {file: a.obj}\n");
     text_appendf(&obj, "mtllib a.mtl\nusemtl red\n" FACE "f 1 1 1\n");
-    text_appendf(&expected,
-                 "scene.yaml:4:18: warning: a.obj: triangles without area, which are never hit: 1\n"
-                 "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n");
+    text_appendf(&expected, "a.mtl:2:4: warning: 'Kd' must be 0 or more, not -1; the default is used\n"
+                            "scene.yaml:4:18: warning: a.obj: 1 triangle has no area and is never hit\n");
     for (int i = 0; i < 25; i++) {
         text_appendf(&obj, "word%d\n", i);
-        if (i < 18) text_appendf(&expected, "a.obj:%d:1: warning: 'word%d' is not used\n", 8 + i, i);
+        if (i < 18)
+            text_appendf(&expected, "a.obj:%d:1: warning: 'word%d' is not supported and is ignored\n", 8 + i,
+                         i);
     }
     text_appendf(&expected, "scene.yaml:warning: 7 more warnings are not shown\n");
     file_write("a.mtl", "newmtl red\nKd -1\n");
@@ -462,11 +482,13 @@ TEST(files_have_each_message_once)
     text_free(&expected);
 
     file_write("a.obj", CORNERS "f 1 2 4\n");
-    text_appendf(&expected, "a.obj:4:7: error: a face names vertex 4 (from 1); there are 3\n");
+    text_appendf(&expected,
+                 "a.obj:4:7: error: a face names vertex 4 (counted from 1), but the file has only 3\n");
     assert_false(scene_read(&scene, text_c(&scene_text), text_c(&expected)));
     unlink("a.obj");
     text_free(&expected);
-    text_appendf(&expected, "scene.yaml:4:18: error: a.obj: No such file or directory\n");
+    text_appendf(&expected,
+                 "scene.yaml:4:18: error: a.obj: cannot read the file: No such file or directory\n");
     assert_false(scene_read(&scene, text_c(&scene_text), text_c(&expected)));
     text_free(&expected);
     text_free(&obj);
@@ -486,10 +508,10 @@ TEST(many_large_polygons_are_refused)
     }
     Scene scene;
     file_write("a.obj", text_c(&text));
-    assert_false(
-        scene_read(&scene, SCENE_OF(""),
-                   "scene.yaml:4:18: error: a.obj: polygons have too many corners: their squared counts sum "
-                   "to 2415919104; at most 2147483648 is allowed\n"));
+    assert_false(scene_read(
+        &scene, SCENE_OF(""),
+        "scene.yaml:4:18: error: a.obj: the polygons have too many corners; the sum of their squared "
+        "counts is 2415919104, but at most 2147483648 is supported\n"));
 }
 
 TEST(faults_have_their_place)
@@ -498,32 +520,34 @@ TEST(faults_have_their_place)
         const char *obj, *expected;
     } cases[] = {
         {"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n",
-         "a.obj:3:5: error: 'nan' is not a coordinate: a number up to 1e+30\n"},
+         "a.obj:3:5: error: a coordinate must be a number of at most 1e+30 in magnitude, not 'nan'\n"},
         {"v 0 0 0\nv 1e35 0 0\nv 0 1 0\nf 1 2 3\n",
-         "a.obj:2:3: error: '1e35' is not a coordinate: a number up to 1e+30\n"},
+         "a.obj:2:3: error: a coordinate must be a number of at most 1e+30 in magnitude, not '1e35'\n"},
         {"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2:6: error: a coordinate of the vertex is missing\n"},
         {"v nan 0 0\nv 0 0 0\nv 1 0x1 0\nv 0 1 0\nf -3 -2 -1\n",
-         "a.obj:3:5: error: '0x1' is not a coordinate: a number up to 1e+30\n"},
-        {"v 0 0 0 0\n", "a.obj:1:10: error: the fourth number of a vertex is 0\n"},
-        {CORNERS "f 1 2 4\n", "a.obj:4:7: error: a face names vertex 4 (from 1); there are 3\n"},
+         "a.obj:3:5: error: a coordinate must be a number of at most 1e+30 in magnitude, not '0x1'\n"},
+        {"v 0 0 0 0\n", "a.obj:1:10: error: the fourth number of a vertex must not be zero\n"},
+        {CORNERS "f 1 2 4\n",
+         "a.obj:4:7: error: a face names vertex 4 (counted from 1), but the file has only 3\n"},
         {CORNERS "f 1 2 0\n",
          "a.obj:4:7: error: a face names vertex 0; indices count from 1, or backward from -1\n"},
-        {CORNERS "f -4 2 3\n", "a.obj:4:3: error: a face names vertex -4; there are 3 before it\n"},
+        {CORNERS "f -4 2 3\n",
+         "a.obj:4:3: error: a face names vertex -4, but the file has only 3 before the face\n"},
         {CORNERS "f 1 2 9999999999\n",
-         "a.obj:4:7: error: a face names vertex 9999999999; there are 3 before it\n"},
+         "a.obj:4:7: error: a face names vertex 9999999999, but the file has only 3 before the face\n"},
         {CORNERS "f 1 2 99999999999\n",
-         "a.obj:4:7: error: a face names vertex 99999999999; there are 3 before it\n"},
+         "a.obj:4:7: error: a face names vertex 99999999999, but the file has only 3 before the face\n"},
         {CORNERS "f 1 2 1000000000000000000\n",
          "a.obj:4:7: error: '1000000000000000000' is not a corner of a face\n"},
         {CORNERS "f 1 2 4294967295\n",
-         "a.obj:4:7: error: a face names vertex 4294967295 (from 1); there are 3\n"},
+         "a.obj:4:7: error: a face names vertex 4294967295 (counted from 1), but the file has only 3\n"},
         {CORNERS "f 1 2 x\n", "a.obj:4:7: error: 'x' is not a corner of a face\n"},
         {CORNERS "f 1 2 3/1/1/1\n", "a.obj:4:7: error: '3/1/1/1' is not a corner of a face\n"},
         {CORNERS "f 1 2 3.5\n", "a.obj:4:7: error: '3.5' is not a corner of a face\n"},
         {CORNERS "f 1 2 -\n", "a.obj:4:7: error: '-' is not a corner of a face\n"},
         {CORNERS "f 1 2\n", "scene.yaml:4:18: warning: a.obj: faces of one or two corners are not shown\n"
-                            "scene.yaml:4:18: error: a.obj: no triangles\n"},
-        {"", "scene.yaml:4:18: error: a.obj: no triangles\n"},
+                            "scene.yaml:4:18: error: a.obj: the mesh has no triangles\n"},
+        {"", "scene.yaml:4:18: error: a.obj: the mesh has no triangles\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Scene scene;
@@ -532,14 +556,14 @@ TEST(faults_have_their_place)
     }
     file_write_bytes("a.obj", "v 0\0", 4);
     Scene scene;
-    assert_false(scene_read(&scene, SCENE_OF(""), "a.obj:1:4: error: not text: a NUL character\n"));
+    assert_false(scene_read(&scene, SCENE_OF(""), "a.obj:1:4: error: the file contains a NUL character\n"));
     OwnedText text = {0};
     text_appendf(&text, CORNERS "f");
     for (int i = 0; i <= 16384; i++)
         text_appendf(&text, " 1");
     file_write("a.obj", text_c(&text));
-    assert_false(
-        scene_read(&scene, SCENE_OF(""), "a.obj:4:2: error: a face of 16385 corners; 16384 is the most\n"));
+    assert_false(scene_read(&scene, SCENE_OF(""),
+                            "a.obj:4:2: error: a face has 16385 corners; at most 16384 are supported\n"));
 }
 
 typedef struct {

@@ -149,12 +149,14 @@ TEST(faults_name_line_and_row)
         const char *text, *message;
     } cases[] = {
         {HEADER CORNERS "3 0 1 2\n2000000000 1 3 2\n",
-         "15:1: error: face 1 (from 0) declares 2000000000 numbers of 'vertex_indices', the line has 3 more"},
-        {HEADER CORNERS "3 0 1\n3 1 3 2\n",
-         "14:1: error: face 0 (from 0) declares 3 numbers of 'vertex_indices', the line has 2 more"},
-        {HEADER CORNERS "3 0 1 2\n", "15:1: error: the file ends before face 1 (from 0) of 2"},
-        {HEADER CORNERS, "14:1: error: the file ends before face 0 (from 0) of 2"},
-        {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES, "11:4: error: vertex 1 (from 0) lacks its 'z'"},
+         "15:1: error: face 1 (counted from 0) declares 2000000000 numbers of 'vertex_indices', but the line "
+         "has only 3"},
+        {HEADER CORNERS "3 0 1\n3 1 3 2\n", "14:1: error: face 0 (counted from 0) declares 3 numbers of "
+                                            "'vertex_indices', but the line has only 2"},
+        {HEADER CORNERS "3 0 1 2\n", "15:1: error: the file ends before face 1 (counted from 0) of 2"},
+        {HEADER CORNERS, "14:1: error: the file ends before face 0 (counted from 0) of 2"},
+        {HEADER "0 0 0\n1 0\n0 1 0\n1 1 0\n" TRIANGLES,
+         "11:4: error: vertex 1 (counted from 0) lacks its 'z'"},
         {HEADER "0 0 0\n1 x 0\n0 1 0\n1 1 0\n" TRIANGLES, "11:3: error: 'x' is not a number of type float"},
         {HEADER "0 0 0\n1 0 1.5.5\n0 1 0\n1 1 0\n" TRIANGLES,
          "11:5: error: '1.5.5' is not a number of type float"},
@@ -164,28 +166,28 @@ TEST(faults_name_line_and_row)
          "15:7: error: '4294967298' is not a number of type int"},
         {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list int int vertex_indices\n" END CORNERS
                "3 0 1 2\n-3 1 3 2\n",
-         "15:1: error: -3 is not the length of a list"},
+         "15:1: error: the length of a list must be whole, not -3"},
         {ASCII "element vertex 4\n" XYZ "element face 2\nproperty list float int vertex_indices\n" END CORNERS
                "3 0 1 2\n2.5 1 3 2\n",
-         "15:1: error: 2.5 is not the length of a list"},
+         "15:1: error: the length of a list must be whole, not 2.5"},
         {ASCII "element vertex 4\n" XYZ "element face 1\nproperty list uchar float texcoord\n"
                "property list uchar int vertex_index\n" END CORNERS "6 0 0 1 0 0 1 1 0\n",
-         "15:18: error: face 0 (from 0) has 1 corner, but 3 texture coordinates"},
-        {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: 'int64' is not a type of PLY"},
+         "15:18: error: face 0 (counted from 0) has 1 corner, but 3 texture coordinates"},
+        {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: there is no PLY type 'int64'"},
         {ASCII "element vertex 4\nproperty list uchar half x\n" END,
-         "4:21: error: 'half' is not a type of PLY"},
-        {ASCII "element vertex 4\nproperty float\n" END, "4:15: error: a property without a name"},
-        {ASCII XYZ END, "3:9: error: a property before the first element"},
-        {ASCII "element vertex -4\n" END, "3:16: error: '-4' is not a number of 'vertex'"},
+         "4:21: error: there is no PLY type 'half'"},
+        {ASCII "element vertex 4\nproperty float\n" END, "4:15: error: the property has no name"},
+        {ASCII XYZ END, "3:9: error: a property must follow an element"},
+        {ASCII "element vertex -4\n" END, "3:16: error: the number of 'vertex' must be whole, not '-4'"},
         {ASCII "element vertex 4\n" XYZ "element vertex 4\n" XYZ END,
          "7:9: error: the header declares 'vertex' twice"},
         {ASCII "element vertex 4\n" XYZ
                "element tristrips 1\nproperty list int int vertex_indices\n" END CORNERS "4 0 1 2 3\n",
-         "7:9: error: strips of triangles (tristrips) are not read, only faces"},
-        {"ply\nformat binary 1.0\n" END, "2:8: error: 'binary' is not a format of PLY"},
-        {"ply\nelement vertex 0\n" END, "3:1: error: the header lacks its format"},
-        {"solid\n", "1:1: error: not a PLY file, which starts with a line 'ply'"},
-        {"", "1:1: error: not a PLY file, which starts with a line 'ply'"},
+         "7:9: error: strips of triangles (tristrips) are not supported; export the mesh with faces"},
+        {"ply\nformat binary 1.0\n" END, "2:8: error: there is no PLY format 'binary'"},
+        {"ply\nelement vertex 0\n" END, "3:1: error: the header lacks a line 'format'"},
+        {"solid\n", "1:1: error: a PLY file must start with a line 'ply'"},
+        {"", "1:1: error: a PLY file must start with a line 'ply'"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.ply", cases[i].text);
@@ -231,9 +233,10 @@ TEST(binary_faults_name_byte_and_row)
         const Type *type = &types[cases[i].type];
         OwnedText text = binary_with_count(headers[cases[i].header], cases[i].count, type);
         file_write_bytes("a.ply", text.items, text.count);
-        assert_refused(formatted("4:18: error: a.ply: byte %zu: face 1 (from 0) declares %s numbers of "
-                                 "'vertex_indices', the file has 3 more",
-                                 text.count - type->size - 12, cases[i].promise));
+        assert_refused(
+            formatted("4:18: error: a.ply: byte %zu: face 1 (counted from 0) declares %s numbers of "
+                      "'vertex_indices', but the file has only 3",
+                      text.count - type->size - 12, cases[i].promise));
     }
 }
 
@@ -243,7 +246,7 @@ TEST(binary_file_cut_short_is_refused)
     OwnedText whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
     assert_square(&whole);
     const size_t header_size = strlen(BINARY("uchar"));
-    char *no_body = text_format("byte %zu: vertex 0 (from 0) lacks its 'x'", header_size);
+    char *no_body = text_format("byte %zu: vertex 0 (counted from 0) lacks its 'x'", header_size);
     for (size_t size = header_size; size < whole.count; size++) {
         file_write_bytes("a.ply", whole.items, size);
         OwnedText messages = scene_messages("scene.yaml", SCENE, false);
@@ -267,8 +270,8 @@ TEST(normals_and_uvs_are_read)
         ASCII FACES "element vertex 4\n" XYZ "property float nx\nproperty float ny\nproperty float nz\n"
                     "property float s\nproperty double t\n" END TRIANGLES
                     "0 0 0 0 0 2 0.5 0.25\n1 0 0 0 1 0 1 0\n0 1 0 0 1 0 nan 1\n1 1 0 0 inf 0 1 1\n",
-        "4:18: warning: a.ply: texture coordinates that are not finite or too large, read as 0: 1\n"
-        "4:18: warning: a.ply: normals that are not finite or too large, not used: 1\n");
+        "4:18: warning: a.ply: 1 texture coordinate is not finite or too large and is read as 0\n"
+        "4:18: warning: a.ply: 1 normal is not finite or too large and is ignored\n");
     const Mesh *mesh = &scene.meshes.items[0];
     const uint32_t(*read)[3] = (const uint32_t(*)[3])mesh->triangles;
     assert_int_equal(mesh->vertex_count, 4);
@@ -302,17 +305,17 @@ TEST(what_is_not_used_is_reported)
     Scene scene = scene_of_ply(ASCII "element vertex 4\n" XYZ "property uchar red\nproperty uchar green\n"
                                      "element edge 1\nproperty int vertex1\nelement empty 9\n" FACES END
                                      "0 0 0 1 1\n1 0 0 1 1\n0 1 0 1 1\n1 1 0 1 1\n0\n" TRIANGLES,
-                               "7:16: warning: not used: 'red', 'green'\n"
-                               "9:9: warning: the element 'edge' is not used\n");
+                               "7:16: warning: these properties of 'vertex' are ignored: 'red', 'green'\n"
+                               "9:9: warning: the element 'edge' is ignored\n");
     scene_free(&scene);
     scene = scene_of_ply(HEADER CORNERS "3 0 1 2 4\n3 1 3 2 5\n\n\n more\nlines\n",
-                         "14:9: warning: words after the last property of a row are not used\n"
-                         "18:2: warning: lines after the last element are not used\n");
+                         "14:9: warning: words after the last property of a row are ignored\n"
+                         "18:2: warning: lines after the last element are ignored\n");
     scene_free(&scene);
     OwnedText bytes = binary_with_count(BINARY("uchar"), 3, &types[1]);
     text_append(&bytes, "\n", 1);
     file_write_bytes("a.ply", bytes.items, bytes.count);
-    assert_messages("scene.yaml", SCENE, "4:18: warning: a.ply: 1 byte after the last element is not used\n");
+    assert_messages("scene.yaml", SCENE, "4:18: warning: a.ply: 1 byte after the last element is ignored\n");
 }
 
 TEST(vertices_without_a_coordinate_are_refused)

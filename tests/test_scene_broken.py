@@ -11,7 +11,7 @@ from scene_tables import messages_of, scenes
 
 TABLES = {path.stem: list(scenes(path)) for path in sorted((ROOT / "tests/broken").glob("*.txt"))}
 # tests/test_scene_yaml.c and test_scene_include.c have these messages, without a file or with many.
-ELSEWHERE = "a scene of more than 2 GiB, recursive include of '', 65 included files"
+ELSEWHERE = "a scene and its files may have at most 2 GiB, '' includes itself, a scene may include at most "
 
 
 class Broken(TestCase):
@@ -55,7 +55,7 @@ class Broken(TestCase):
 
     def test_names(self):
         write("scene.txt", "")
-        self.refuses("check scene.txt", "scene.txt: a scene's name ends in .yaml, .yml, .json, .rt, .cfg, .nff or .dat, or in a mesh's, "
+        self.refuses("check scene.txt", "scene.txt: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff or .dat, or in a mesh's, "
                      "such as .obj, .ply, .stl, .gltf, .glb, .fbx, .dae$")
         self.refuses("check .rt", "^")
         self.refuses("check absent.yml", "absent.yml")

@@ -190,7 +190,7 @@ TEST(losses)
                                                                                        "outline_width 1 "
                                                                                        "color 1 1 1 texfunc "
                                                                                        "0"),
-          "8:86: warning: 'transmode r3d' is not used: opacity does not depend on the angle\n"
+          "8:86: warning: 'transmode r3d' is ignored; opacity does not depend on the angle\n"
           "8:98: warning: outlines are not shown\n");
     WARNS("sphere center 0 0 0 rad 1 " OF(
               "phong metal 1 phong_size 9 color 0.5 0.25 0 texfunc 1 center 0 0 0 "
@@ -198,10 +198,10 @@ TEST(losses)
                                                                           "center 0 0 0 rotate 0 0 0 scale 1 "
                                                                           "1 1 uaxis 1 0 0 vaxis 0 1 0"),
           "7:82: warning: highlights have the light's color, not that of metal\n"
-          "7:128: warning: texfunc 1 is not shown: the color is used\n"
-          "8:96: warning: texfunc 9 is not shown: the color is used\n");
+          "7:128: warning: texfunc 1 is not supported; the color is used\n"
+          "8:96: warning: texfunc 9 is not supported; the color is used\n");
     WARNS("sphere center 0 0 0 rad 1 unknown\nsphere center 0 0 0 rad 1 unknown\n",
-          "7:27: warning: unknown texture 'unknown': white\n");
+          "7:27: warning: there is no texture 'unknown'; white is used\n");
     WARNS("sphere center 0 0 0 rad 0 " TEXTURE "fcylinder base 0 0 0 apex 0 0 0 rad 1 " TEXTURE
           "plane center 0 0 0 normal 0 0 0 " TEXTURE,
           "7:1: warning: a sphere without size or direction is not shown\n"
@@ -212,20 +212,21 @@ TEST(losses)
           "7:1: warning: triangles have the mean of the colors of their vertices\n");
     WARNS("sphere center 0 0 0 rad 1 texture ambient -1 diffuse 1 specular 7 opacity 1.5 color 1 -1 1 "
           "texfunc 0\n",
-          "7:43: warning: 'ambient' must be 0 or more, not -1: the default is used\n"
-          "7:65: warning: 'specular' must be from 0 to 1, not 7: the default is used\n"
-          "7:75: warning: 'opacity' must be from 0 to 1, not 1.5: the default is used\n"
-          "7:85: warning: 'color' must be 0 or more: the default is used\n");
+          "7:43: warning: 'ambient' must be 0 or more, not -1; the default is used\n"
+          "7:65: warning: 'specular' must be from 0 to 1, not 7; the default is used\n"
+          "7:75: warning: 'opacity' must be from 0 to 1, not 1.5; the default is used\n"
+          "7:85: warning: each number of 'color' must be 0 or more; the default is used\n");
     WARNS("shader_mode medium shadow_filter_off ambient_occlusion ambient_color 1 1 1 rescale_direct 0.3 "
           "samples "
           "9 trans_raster3d end_shader_mode\n",
-          "7:13: warning: shader mode 'medium' leaves something out, such as shadows: shown in full\n"
-          "7:20: warning: 'shadow_filter_off' is not used: transparent objects cast shadows\n"
+          "7:13: warning: shader mode 'medium' omits effects such as shadows; the scene is rendered with all "
+          "of them\n"
+          "7:20: warning: 'shadow_filter_off' is ignored; transparent objects cast shadows\n"
           "7:56: warning: ambient occlusion is not shown\n"
-          "7:105: warning: 'trans_raster3d' is not used: opacity does not depend on the angle\n");
+          "7:105: warning: 'trans_raster3d' is ignored; opacity does not depend on the angle\n");
     assert_messages("s.dat", BEGIN CAMERA_OF("projection fisheye", "") SPHERE,
-                    "3:19: warning: the fisheye projection becomes one in perspective\n"
-                    "warning: no lights: only ambient light and emission are shown\n");
+                    "3:19: warning: the fisheye projection is not supported; perspective is used\n"
+                    "warning: the scene has no lights, so only ambient light and emission are shown\n");
 }
 
 TEST(fading)
@@ -233,7 +234,7 @@ TEST(fading)
     const char *text = BEGIN CAMERA_OF("", "") SPHERE
         "sphere center 0 4 0 rad 1 " TEXTURE
         "light center 3 2 0 rad 0.1 attenuation constant 1 linear 2 quadratic 1 color 1.6 0 0\n";
-    assert_messages("s.dat", text, "7:20: warning: lights are not visible themselves\n");
+    assert_messages("s.dat", text, "7:20: warning: the radius of lights is ignored; they are not visible\n");
     OwnedScene scene = scene_of_text("s.dat", text);
     assert_vector(scene.lights.items[0].color, 1.6, 0, 0);
     const double *fading = scene.lights.items[0].fading;

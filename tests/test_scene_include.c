@@ -169,10 +169,11 @@ TEST(set_changes_included_values)
     assert_vector(scene.objects.items[2].as.plane.point, 0, 4, 0);
     assert_int_equal(scene.objects.items[6].line, 0);
     assert_vector(scene.materials.items[0].color, 0, 0, 1);
-    check_messages("forest.yaml", (const char *[]){"ambient=1", "include=ground.yaml", "ambient=x"}, 3,
-                   "--set:1:9: error: 'ambient' must be a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red, "
-                   "not 'x'\n--set:1:9: error: 'include' cannot be set: files are included before values are "
-                   "set\n");
+    check_messages(
+        "forest.yaml", (const char *[]){"ambient=1", "include=ground.yaml", "ambient=x"}, 3,
+        "--set:1:9: error: 'ambient' must be a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red, "
+        "not 'x'\n--set:1:9: error: 'include' cannot be set, because files are included before values are "
+        "set\n");
 }
 
 static void name_append(void *context, const char *path)
@@ -204,7 +205,7 @@ TEST(names_given_twice_are_refused)
                    "forest.yaml:5:10: error: definition 'tree' is already given at parts/trees.yaml:6:3\n");
 }
 
-// Messages are in the order of the files, then of the lines.
+// Messages are in the order in which the mistakes are found.
 TEST(messages_name_the_included_file)
 {
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: -1}\n"
@@ -213,22 +214,23 @@ TEST(messages_name_the_included_file)
     file_write("scene.yaml", "\n\n\n\ninclude: [parts/a.yaml, b.yaml]\n" CAMERA "objects: [sphere: {}]\n");
     check_messages(
         "scene.yaml", (const char *[]){"ambient=-1"}, 1,
-        "scene.yaml:7:19: error: sphere lacks 'center'\n"
-        "scene.yaml:7:19: error: sphere lacks 'radius'\n"
-        "parts/a.yaml:2:41: error: 'radius' must be greater than 0, not '-1'\n"
-        "parts/a.yaml:3:18: error: parts/lost.obj: No such file or directory\n"
-        "parts/a.yaml:4:1: error: unknown scene key 'purple'; the choices are include, camera, frames, fps, "
+        "parts/a.yaml:4:1: error: there is no scene key 'purple'; the choices are include, "
+        "camera, frames, fps, "
         "shutter, background, ambient, lights, materials, define, objects\n"
-        "b.yaml:1:19: error: sphere lacks 'center'\n"
-        "b.yaml:1:19: error: sphere lacks 'radius'\n"
-        "--set:1:9: error: 'ambient' must be 0 or more, not '-1'\n");
+        "--set:1:9: error: 'ambient' must be 0 or more, not '-1'\n"
+        "parts/a.yaml:2:41: error: 'radius' must be greater than 0, not '-1'\n"
+        "parts/a.yaml:3:18: error: parts/lost.obj: cannot read the file: No such file or directory\n"
+        "b.yaml:1:19: error: the sphere lacks 'center'\n"
+        "b.yaml:1:19: error: the sphere lacks 'radius'\n"
+        "scene.yaml:7:19: error: the sphere lacks 'center'\n"
+        "scene.yaml:7:19: error: the sphere lacks 'radius'\n");
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: 1\n");
     file_write("b.yaml", "objects: {}\nlights: []\ndefine: []\nlights: []\n");
     check_messages("scene.yaml", NULL, 0,
+                   "parts/a.yaml:3:1: error: missing comma in flow mapping\n"
                    "b.yaml:1:10: error: 'objects' must be a list, not a mapping\n"
                    "b.yaml:3:9: error: 'define' must be a mapping, not a list of 0\n"
-                   "b.yaml:4:1: error: 'lights' is given twice\n"
-                   "parts/a.yaml:3:1: error: missing comma in flow mapping\n");
+                   "b.yaml:4:1: error: 'lights' is given twice\n");
     file_write("parts/a.yaml", "- objects\n");
     file_write("b.yaml", "");
     check_messages("scene.yaml", NULL, 0,
@@ -242,9 +244,9 @@ TEST(recursive_includes_are_refused)
     file_write("parts/a.yaml", "lights: []\ninclude: ../b.yaml\n");
     file_write("b.yaml", "include:\n  - parts/a.yaml\n  - scene.yaml\n  - b.yaml\n");
     check_messages("scene.yaml", NULL, 0,
-                   "parts/../b.yaml:2:5: error: recursive include of 'parts/../parts/a.yaml'\n"
-                   "parts/../b.yaml:3:5: error: recursive include of 'parts/../scene.yaml'\n"
-                   "parts/../b.yaml:4:5: error: recursive include of 'parts/../b.yaml'\n");
+                   "parts/../b.yaml:2:5: error: 'parts/../parts/a.yaml' includes itself\n"
+                   "parts/../b.yaml:3:5: error: 'parts/../scene.yaml' includes itself\n"
+                   "parts/../b.yaml:4:5: error: 'parts/../b.yaml' includes itself\n");
 }
 
 TEST(number_of_included_files_is_limited)
@@ -268,7 +270,7 @@ TEST(number_of_included_files_is_limited)
     text_appendf(&scene, "include: [%s last.yaml, lost.yaml]\n" CAMERA, text_c(&list));
     file_write("scene.yaml", text_c(&scene));
     check_messages("scene.yaml", NULL, 0,
-                   formatted("scene.yaml:1:%zu: error: more than 100 included files\n",
+                   formatted("scene.yaml:1:%zu: error: a scene may include at most 100 files\n",
                              strlen("include: [") + list.count + 2));
     text_free(&scene);
     // a file that cannot be read counts
@@ -277,7 +279,7 @@ TEST(number_of_included_files_is_limited)
     file_write("scene.yaml", text_c(&scene));
     check_messages("scene.yaml", NULL, 0,
                    formatted("scene.yaml:1:11: error: cannot read 'unreadable.yaml': Input/output error\n"
-                             "scene.yaml:1:%zu: error: more than 100 included files\n",
+                             "scene.yaml:1:%zu: error: a scene may include at most 100 files\n",
                              strlen("include: [unreadable.yaml, ") + list.count + 1 - strlen("99.yaml, ")));
     text_free(&scene);
 }

@@ -114,12 +114,12 @@ TEST(tolerated)
     assert_messages("s.nff", LIT SPHERE SPHERE,
                     "7:1: warning: no material precedes this object; it is white\n");
     assert_messages("s.nff", LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
-                    "8:1: warning: a degenerate polygon is never hit\n");
+                    "8:1: warning: the polygon has no area and is never hit\n");
     assert_messages("s.nff", LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
-                    "8:1: warning: the polygon intersects itself; only parts are filled\n");
-    assert_messages("s.nff", LIT, "warning: no objects: only the background is shown\n");
+                    "8:1: warning: the polygon intersects itself; only parts of it are filled\n");
+    assert_messages("s.nff", LIT, "warning: the scene has no objects, so only the background is shown\n");
     assert_messages("s.nff", VIEW MATERIAL SPHERE,
-                    "warning: no lights: only ambient light and emission are shown\n");
+                    "warning: the scene has no lights, so only ambient light and emission are shown\n");
 }
 
 static void check_sides(const char *shape, double reach, bool only_inside)

@@ -82,7 +82,8 @@ TEST(square_on_the_floor)
 TEST(missing_parts_are_fine)
 {
     assert_messages("s.rt", CAMERA,
-                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
+                    "warning: the scene has no objects, so only the background is shown\nwarning: the scene "
+                    "has no lights, so only ambient "
                     "light and emission are shown\n");
     OwnedScene scene = scene_of_text("s.rt", CAMERA);
     assert_vector(scene.ambient, 0, 0, 0);
@@ -102,11 +103,12 @@ TEST(lenient_reads_dialects)
                              "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
                              "cy 0,0,0 0,1,0 255 , 0 , 0 1 2\n";
     OwnedText messages = scene_messages("s.rt", text, true);
-    assert_string_equal(text_c(&messages),
-                        "3:10: warning: 'ratio' is above 1; used unchanged\n"
-                        "4:31: warning: skipped 'cb:8'\n"
-                        "5:22: warning: skipped 'earth.xpm'\n"
-                        "6:16: warning: the color precedes the diameter and the height; accepted\n");
+    assert_string_equal(
+        text_c(&messages),
+        "3:10: warning: 'ratio' is above 1; it is used unchanged\n"
+        "4:31: warning: 'cb:8' is skipped\n"
+        "5:22: warning: 'earth.xpm' is skipped\n"
+        "6:16: warning: the color is accepted although it precedes the diameter and the height\n");
     OwnedText source = {0};
     text_appendf(&source, "%s", text);
     OwnedMessageList list = {0};
@@ -128,7 +130,7 @@ TEST(lenient_keeps_other_errors)
     assert_string_equal(text_c(&messages),
                         "3:10: error: 'diameter' must be greater than 0, not '-2'\n"
                         "4:7: error: 'center' must be a number, not nothing\n"
-                        "5:4: error: 'center' must be three numbers with commas between, not '0, 0'\n"
+                        "5:4: error: 'center' must be three numbers separated by commas, not '0, 0'\n"
                         "6:9: error: 'ratio' must be 0 or more, not '-1'\n");
 }
 
@@ -139,8 +141,9 @@ TEST(many_warnings_are_counted)
     for (int i = 0; i < 30; i++)
         text_appendf(&text, "pl 0,0,0 0,0.5,0 255,0,0\n");
     OwnedText messages = scene_messages("s.rt", text_c(&text), false);
-    assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not a unit vector; normalized\n"
-                                              "warning: 10 more warnings are not shown\n"));
+    assert_non_null(strstr(text_c(&messages),
+                           "22:10: warning: 'normal' is not a unit vector; it is normalized\n"
+                           "warning: 10 more warnings are not shown\n"));
 }
 
 TEST_MAIN(set_up, complete_close)

@@ -134,18 +134,20 @@ TEST(tints)
 
 TEST(energy)
 {
-    assert_messages("a.yaml",
-                    "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
-                    "materials:\n"
-                    "  a: {reflection: 0.1, transmission: 0.9}\n"
-                    "  b: {transmission: 0.9, reflection: [0.2, 0, 0]}\n"
-                    "  c: {transmission: 1, reflection: 0.04, fresnel: true}\n",
-                    "4:38: warning: reflection 0.2 and transmission 0.9 exceed 1 together: the surface adds "
-                    "light\n"
-                    "5:36: warning: reflection 0.04 and transmission 1 exceed 1 together: the surface adds "
-                    "light; by 'fresnel' it reflects a part of its transmission\n"
-                    "warning: no objects: only the background is shown\nwarning: no lights: only ambient "
-                    "light and emission are shown\n");
+    assert_messages(
+        "a.yaml",
+        "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
+        "materials:\n"
+        "  a: {reflection: 0.1, transmission: 0.9}\n"
+        "  b: {transmission: 0.9, reflection: [0.2, 0, 0]}\n"
+        "  c: {transmission: 1, reflection: 0.04, fresnel: true}\n",
+        "4:38: warning: reflection 0.2 and transmission 0.9 exceed 1 together, so the surface adds "
+        "light\n"
+        "5:36: warning: reflection 0.04 and transmission 1 exceed 1 together, so the surface adds "
+        "light; by 'fresnel' it reflects a part of its transmission\n"
+        "warning: the scene has no objects, so only the background is shown\nwarning: the scene has no "
+        "lights, so only ambient "
+        "light and emission are shown\n");
 }
 
 TEST(shapes)
@@ -408,10 +410,10 @@ TEST(warnings)
 {
     assert_messages("s.yaml", LIT SPHERE, "");
     assert_messages("s.yaml", CAMERA SPHERE,
-                    "warning: no lights: only ambient light and emission are shown\n");
-    assert_messages("s.yaml", LIT, "warning: no objects: only the background is shown\n");
+                    "warning: the scene has no lights, so only ambient light and emission are shown\n");
+    assert_messages("s.yaml", LIT, "warning: the scene has no objects, so only the background is shown\n");
     assert_messages("s.yaml", LIT "objects:\n  - triangle: {vertices: [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}\n",
-                    "5:15: warning: a triangle without area is never hit\n");
+                    "5:15: warning: the triangle has no area and is never hit\n");
 }
 
 // Reads a scene of each format.
@@ -447,7 +449,7 @@ TEST(more_than_2_gibibytes_are_refused)
     MessageList messages = {0};
     Scene scene;
     assert_false(scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages));
-    check_only_message(&messages, "a scene of more than 2 GiB");
+    check_only_message(&messages, "a scene and its files may have at most 2 GiB");
 }
 
 TEST_MAIN(set_up, complete_close)

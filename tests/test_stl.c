@@ -40,11 +40,11 @@ TEST(text_is_read)
          ""},
         {"solid a\n" FACET("0 0 0", "1 0 0", "0 1 0") "endsolid a\nsolid b\ncolor 1 0 0\ncolor 1 0 0\n" FACET(
              "0 1 0", "1 0 0", "1 1 0") "endsolid b",
-         "11:1: warning: 'color' is not used\n"},
+         "11:1: warning: 'color' is not a keyword of STL and is ignored\n"},
         {" \tsolid\n" TWO_FACETS, ""},
         {"\xEF\xBB\xBFsolid\n" TWO_FACETS, ""},
         {"# made by hand\r\r\n\nsolid\n" TWO_FACETS, ""},
-        {"; by hand\n solid\n" TWO_FACETS, "1:1: warning: ';' is not used\n"},
+        {"; by hand\n solid\n" TWO_FACETS, "1:1: warning: ';' is not a keyword of STL and is ignored\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.stl", cases[i].text);
@@ -78,8 +78,8 @@ TEST(binary_is_read)
     binary_fill(bytes, "colored");
     bytes[WHOLE - 1] = 1;
     file_write_bytes("a.stl", bytes, WHOLE + 3);
-    assert_square("4:18: warning: a.stl: attributes of facets, such as colors, are not used\n"
-                  "4:18: warning: a.stl: 3 bytes after the last facet are not used\n");
+    assert_square("4:18: warning: a.stl: attributes of facets, such as colors, are ignored\n"
+                  "4:18: warning: a.stl: 3 bytes after the last facet are ignored\n");
 }
 
 TEST(faults_have_their_place)
@@ -88,18 +88,17 @@ TEST(faults_have_their_place)
         const char *text, *message;
     } cases[] = {
         {"solid\n" FACET("0 0 0", "1 x 0", "0 1 0"),
-         "5:14: error: 'x' is not a coordinate: a number up to 1e+30\n"},
+         "5:14: error: a coordinate must be a number of at most 1e+30 in magnitude, not 'x'\n"},
         {"solid\n" FACET("0 0 0", "1 0", "0 1 0"), "5:15: error: a coordinate of the vertex is missing\n"},
         {"solid\n" FACET("0 0 0", "1 1e31 0", "0 1 0"),
-         "5:14: error: '1e31' is not a coordinate: a number up to 1e+30\n"},
+         "5:14: error: a coordinate must be a number of at most 1e+30 in magnitude, not '1e31'\n"},
         {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
-         "6:1: error: a facet of 2 corners\n"},
+         "6:1: error: a facet has 2 corners instead of 3\n"},
         {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n",
          "7:1: error: the file ends within a facet\n"},
-        {"solid\nendsolid\n", "4:18: error: a.stl: no triangles\n"},
-        {"facet",
-         "4:18: error: a.stl: byte 5: not an STL file, which starts with 'solid' or has 84 bytes before "
-         "its facets\n"},
+        {"solid\nendsolid\n", "4:18: error: a.stl: the mesh has no triangles\n"},
+        {"facet", "4:18: error: a.stl: byte 5: an STL file must start with 'solid' or have 84 bytes before "
+                  "its facets\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.stl", cases[i].text);
@@ -109,15 +108,18 @@ TEST(faults_have_their_place)
     binary_fill(bytes, "");
     file_write_bytes("a.stl", bytes, WHOLE - 1);
     assert_messages("scene.yaml", SCENE,
-                    "4:18: error: a.stl: byte 80: 2 facets are declared, the file has 1\n");
+                    "4:18: error: a.stl: byte 80: 2 facets are declared, but the file has only 1\n");
     memset(bytes + 80, 0xff, 4);
     file_write_bytes("a.stl", bytes, WHOLE);
-    assert_messages("scene.yaml", SCENE, "4:18: error: a.stl: byte 80: too many facets\n");
+    assert_messages(
+        "scene.yaml", SCENE,
+        "4:18: error: a.stl: byte 80: 4294967295 facets are declared; at most 1431655764 are supported\n");
     binary_fill(bytes, "");
     memset(bytes + HEADER + 12, 0xff, 4);
     file_write_bytes("a.stl", bytes, WHOLE);
     assert_messages("scene.yaml", SCENE,
-                    "4:18: error: a.stl: vertex 0 (from 0) is not finite or too large\n");
+                    "4:18: error: a.stl: vertex 0 (counted from 0) has a coordinate that is not a number of "
+                    "at most 1e+30 in magnitude\n");
 }
 
 TEST_MAIN(folder_open, folder_close)

@@ -364,7 +364,7 @@ TEST(opaque_images_cut_nothing)
         assert_int_equal((features_of(&scene) & FEATURE_CUTOUTS) != 0, i == 1);
         assert_messages("s.yaml", text,
                         i == 1 ? ""
-                               : "3:69: warning: the alpha of 'scenes/images/globe.png' is 1 everywhere: "
+                               : "3:69: warning: the alpha of 'scenes/images/globe.png' is 1 everywhere, so "
                                  "nothing is cut out\n");
     }
 }
@@ -503,7 +503,7 @@ TEST(texture_faults_are_reported)
     TestTexture texture = texture_make(3, 2);
     texture.colors[4][1] = NAN;
     texture_write(&texture);
-    check_refused("a color is not finite");
+    check_refused("has a color that is not finite");
 }
 
 TEST(textures_are_shared)

@@ -27,7 +27,8 @@ static void nodes_compare(const YamlTree *got, uint32_t got_node, const YamlTree
 // Returns whether the error means that the text is not for libfyaml.
 static bool is_refused(const char *error)
 {
-    return strcmp(error, "not UTF-8 text") == 0 || strstr(error, "in a text with tabs");
+    return strcmp(error, "the file must be UTF-8 text without NUL characters") == 0 ||
+           strstr(error, "in a text with tabs");
 }
 
 // Returns whether the text could be parsed in parts. Its tree then equals that of the whole, and otherwise it

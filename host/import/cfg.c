@@ -124,13 +124,13 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     const Word word = line_word(line);
     unsigned key = 0;
     if (word_is(word, "transfo") && block->type == BLOCK_OBJECT) {
-        report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
+        report_warning(&reader->report, word.offset, "'transfo' is not supported; the object is not moved");
         return true;
     }
     while (key < KEY_COUNT && !((block->keys >> key & 1) && word_is(word, keys[key].name)))
         key++;
     if (key == KEY_COUNT)
-        return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
+        return report_error(&reader->report, word.offset, "there is no %s key '%.*s'", block->name,
                             WORD_TEXT(word));
     if (*seen >> key & 1)
         return report_error(&reader->report, word.offset, "'%s' is given twice", keys[key].name);
@@ -173,7 +173,7 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     all_read &= line_end(line);
     for (unsigned key = 0; key < KEY_COUNT; key++)
         if ((block->keys & ~seen) >> key & 1)
-            all_read = report_error(&reader->report, start, "%s lacks '%s'", block->name, keys[key].name);
+            all_read = report_error(&reader->report, start, "the %s lacks '%s'", block->name, keys[key].name);
     return all_read;
 }
 
@@ -195,7 +195,7 @@ static const Block *block_find(CfgReader *reader)
     for (size_t i = 0; i < COUNT_OF(blocks); i++) {
         if (word_is(name, blocks[i].name)) return line_end(&reader->line) ? &blocks[i] : NULL;
     }
-    report_error(&reader->report, name.offset, "unknown block '%.*s'", WORD_TEXT(name));
+    report_error(&reader->report, name.offset, "there is no block '%.*s'", WORD_TEXT(name));
     return NULL;
 }
 
@@ -214,6 +214,7 @@ static void block_open(CfgReader *reader)
         block_skip(line);
         return;
     }
+    if (block->type == BLOCK_CAMERA) line_is_first(line, &reader->has_camera, "camera");
     const bool has_line = line_next_filled(line);
     if (!has_line || !word_is(line_peek(line), "{")) {
         report_error(&reader->report, has_line ? line->start : line_offset(line), "'{' is missing");
@@ -221,9 +222,7 @@ static void block_open(CfgReader *reader)
     }
     line_word(line);
     line_end(line);
-    bool is_camera = block->type == BLOCK_CAMERA;
-    if (is_camera && reader->has_camera) report_error(&reader->report, start, "a second camera");
-    reader->has_camera |= is_camera;
+    const bool is_camera = block->type == BLOCK_CAMERA;
     BlockValues values = {0};
     if (!block_read(reader, block, start, &values)) return;
     if (is_camera && vector_is_zero(vector_subtract(values.look_at, values.position)))
@@ -238,7 +237,8 @@ static void block_read_or_skip(void *context)
     if (word_opens_block(word))
         block_open(reader);
     else
-        report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
+        report_warning(&reader->report, word.offset, "'%.*s' is not in a block and is skipped",
+                       WORD_TEXT(word));
 }
 
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
@@ -249,7 +249,8 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
     if (line_is_text(&reader.line)) {
         line_elements(&reader.line, scene, block_read_or_skip, &reader);
         if (!reader.has_camera && !report_is_full(&reader.report))
-            report_error(&reader.report, source->length, "no camera: a block =>camera");
+            report_error(&reader.report, source->length,
+                         "the scene has no camera; a block '=>camera' adds one");
     }
     return scene_finish(scene, &reader.report, &(SceneOptions){0});
 }

@@ -3,6 +3,7 @@
 // what is read and how it maps to glint.
 #include "host/import/dat.h"
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <search.h>
@@ -18,11 +19,9 @@ bool dat_skip(DatReader *reader, const char *keyword)
 
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
-    if (!report_repeats(&reader->report, NULL, 0, 0, text))
-        report_warning(&reader->report, offset, "%s", text);
-    free(text);
+    if (!report_repeats(&reader->report, NULL, 0, text)) report_warning(&reader->report, offset, "%s", text);
 }
 
 bool dat_expect(DatReader *reader, const char *keyword)
@@ -68,7 +67,7 @@ static bool shader_mode_read(DatReader *reader)
     reader->last_colored = (ColoredMaterial){0}; // its texture's text may have another meaning from now on
     if (!word_is_in_any_case(quality, "full"))
         dat_warn(reader, quality.offset,
-                 "shader mode '%.*s' leaves something out, such as shadows: shown in full",
+                 "shader mode '%.*s' omits effects such as shadows; the scene is rendered with all of them",
                  WORD_TEXT(quality));
     while (!dat_skip(reader, "end_shader_mode")) {
         const Line before = reader->line;
@@ -80,10 +79,9 @@ static bool shader_mode_read(DatReader *reader)
             reader->dims_clear = false;
         else if (word_is_in_any_case(word, "trans_raster3d"))
             dat_warn(reader, word.offset,
-                     "'trans_raster3d' is not used: opacity does not depend on the angle");
+                     "'trans_raster3d' is ignored; opacity does not depend on the angle");
         else if (word_is_in_any_case(word, "shadow_filter_off"))
-            dat_warn(reader, word.offset,
-                     "'shadow_filter_off' is not used: transparent objects cast shadows");
+            dat_warn(reader, word.offset, "'shadow_filter_off' is ignored; transparent objects cast shadows");
         else if (word_is_in_any_case(word, "trans_max_surfaces"))
             read = line_number(&reader->line, "trans_max_surfaces", NULL, &unused);
         else if (word_is_in_any_case(word, "ambient_occlusion"))
@@ -177,7 +175,7 @@ static void statement_read(void *context)
     const Word word = value_word(&reader->line);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
-        report_error(&reader->report, word.offset, "unknown statement '%.*s'", WORD_TEXT(word));
+        report_error(&reader->report, word.offset, "there is no statement '%.*s'", WORD_TEXT(word));
     } else if (statements[index].read) {
         if (statements[index].read(reader)) return;
     } else {
@@ -197,10 +195,11 @@ bool scene_read_dat(Scene *scene, const Source *source, const SceneOptions *opti
     if (line_is_text(&reader.line)) {
         if (!word_is_in_any_case(value_peek(&reader.line), "begin_scene"))
             report_error(&reader.report, value_peek(&reader.line).offset,
-                         "a scene starts with 'begin_scene'");
+                         "the scene must start with 'begin_scene'");
         line_elements(&reader.line, scene, statement_read, &reader);
         if (!reader.has_camera && !report_is_full(&reader.report))
-            report_error(&reader.report, source->length, "no camera: a block 'camera'");
+            report_error(&reader.report, source->length,
+                         "the scene has no camera; a block 'camera' adds one");
     }
     tdestroy(reader.textures, free);
     return scene_finish(scene, &reader.report, options);

@@ -74,17 +74,17 @@ bool dat_polycylinder(DatReader *reader)
     const size_t offset = reader->line.start;
     unsigned count;
     double radius;
-    ARRAY_OF(Vector3) points = {0};
-    bool read = dat_expect(reader, "points") && count_read(reader, "points", &count);
-    for (unsigned i = 0; read && i < count; i++) {
+    OWNED ARRAY_OF(Vector3) points = {0};
+    if (!dat_expect(reader, "points") || !count_read(reader, "points", &count)) return false;
+    for (unsigned i = 0; i < count; i++) {
         Vector3 point;
-        read = dat_coordinates(reader, "points", &point);
+        if (!dat_coordinates(reader, "points", &point)) return false;
         array_push(points, point);
     }
     uint32_t material;
-    read = read && dat_number(reader, "rad", &radius) && dat_texture(reader, &material);
-    if (read && !(radius > 0)) dat_warn(reader, offset, "a polycylinder without a radius is not shown");
-    for (size_t i = 0; read && radius > 0 && i < points.count; i++) {
+    if (!dat_number(reader, "rad", &radius) || !dat_texture(reader, &material)) return false;
+    if (!(radius > 0)) dat_warn(reader, offset, "a polycylinder without a radius is not shown");
+    for (size_t i = 0; radius > 0 && i < points.count; i++) {
         const Vector3 point = points.items[i];
         const Vector3 axis = i > 0 ? vector_subtract(points.items[i - 1], point) : (Vector3){0, 0, 0};
         const Object sphere = {.type = SHAPE_SPHERE,
@@ -97,8 +97,7 @@ bool dat_polycylinder(DatReader *reader)
         array_push(reader->scene->objects, sphere);
         if (!vector_is_zero(axis)) array_push(reader->scene->objects, cylinder);
     }
-    free(points.items);
-    return read;
+    return true;
 }
 
 static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
@@ -304,8 +303,8 @@ static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
         if (!count_read(reader, name, &index)) return false;
         if (index >= array->mesh.vertex_count)
             return report_error(&reader->report, index_offset,
-                                "a triangle names vertex %u (from 0); there are %zu", index,
-                                array->mesh.vertex_count);
+                                "a triangle names vertex %u (counted from 0), but the array has only %zu",
+                                index, array->mesh.vertex_count);
         if (is_strip) {
             corners[0] = corners[1];
             corners[1] = corners[2];

@@ -35,7 +35,7 @@ static bool factor_read(DatReader *reader, const char *name, const Range *range,
     if (range_holds(range, number))
         *factor = number;
     else
-        dat_warn(reader, offset, "'%s' must be %s, not %g: the default is used", name, range->must, number);
+        dat_warn(reader, offset, "'%s' must be %s, not %g; the default is used", name, range->must, number);
     return true;
 }
 
@@ -47,7 +47,7 @@ static bool color_read(DatReader *reader, Color *color)
     if (numbers_are_sound(read))
         *color = read;
     else
-        dat_warn(reader, offset, "'color' must be 0 or more: the default is used");
+        dat_warn(reader, offset, "each number of 'color' must be 0 or more; the default is used");
     return true;
 }
 
@@ -66,7 +66,7 @@ static bool transmode_read(DatReader *reader)
 {
     const Word mode = value_word(&reader->line);
     if (word_is_in_any_case(mode, "r3d"))
-        dat_warn(reader, mode.offset, "'transmode r3d' is not used: opacity does not depend on the angle");
+        dat_warn(reader, mode.offset, "'transmode r3d' is ignored; opacity does not depend on the angle");
     return true;
 }
 
@@ -88,7 +88,7 @@ static bool function_read(DatReader *reader)
     const size_t offset = value_peek(&reader->line).offset;
     unsigned function;
     if (!line_whole_number(&reader->line, "texfunc", &range_function, &function)) return false;
-    if (function > 0) dat_warn(reader, offset, "texfunc %u is not shown: the color is used", function);
+    if (function > 0) dat_warn(reader, offset, "texfunc %u is not supported; the color is used", function);
     if (function >= FIRST_IMAGE) value_word(&reader->line);
     for (size_t i = 0; i < COUNT_OF(keywords) && function > 0; i++) {
         Vector3 unused;
@@ -136,7 +136,7 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
     if (word_is_in_any_case(word, "outline")) return outline_read(reader, "outline");
     if (word_is_in_any_case(word, "outline_width")) return outline_read(reader, "outline_width");
     if (!word.length) return report_error(&reader->report, word.offset, "the texture lacks its 'texfunc'");
-    return report_error(&reader->report, word.offset, "unknown key '%.*s' of a texture", WORD_TEXT(word));
+    return report_error(&reader->report, word.offset, "there is no texture key '%.*s'", WORD_TEXT(word));
 }
 
 bool dat_texture_body(DatReader *reader, Material *material)
@@ -179,7 +179,7 @@ static uint32_t texture_find(DatReader *reader, Word name)
 {
     NamedTexture **known = tfind(&(NamedTexture){.name = name}, &reader->textures, names_compare);
     if (known) return (*known)->material;
-    dat_warn(reader, name.offset, "unknown texture '%.*s': white", WORD_TEXT(name));
+    dat_warn(reader, name.offset, "there is no texture '%.*s'; white is used", WORD_TEXT(name));
     const Material white = dat_texture_default();
     const uint32_t material = scene_add_material(reader->scene, &white, "");
     texture_add(reader, name, material);

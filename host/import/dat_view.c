@@ -24,12 +24,13 @@ static bool projection_read(DatReader *reader)
     if (word_is_in_any_case(name, "orthographic")) {
         reader->scene->camera.projection = PROJECTION_ORTHOGRAPHIC;
     } else if (word_is_in_any_case(name, "perspective_dof")) {
-        report_warning(&reader->report, name.offset, "depth of field is not shown: all is in focus");
+        report_warning(&reader->report, name.offset, "depth of field is not shown; everything is in focus");
         return dat_number(reader, "focallength", &unused) && dat_number(reader, "aperture", &unused);
     } else if (word_is_in_any_case(name, "fisheye")) {
-        report_warning(&reader->report, name.offset, "the fisheye projection becomes one in perspective");
+        report_warning(&reader->report, name.offset,
+                       "the fisheye projection is not supported; perspective is used");
     } else if (!word_is_in_any_case(name, "perspective")) {
-        return report_error(&reader->report, name.offset, "unknown projection '%.*s'", WORD_TEXT(name));
+        return report_error(&reader->report, name.offset, "there is no projection '%.*s'", WORD_TEXT(name));
     }
     return true;
 }
@@ -45,7 +46,7 @@ static bool camera_block_read(DatReader *reader, CameraBlock *block)
     const size_t offset = value_peek(&reader->line).offset;
     if (!line_number(&reader->line, "aspectratio", &range_positive, &block->aspect)) return false;
     if (block->aspect != 1)
-        report_warning(&reader->report, offset, "'aspectratio' is not used: pixels are square");
+        report_warning(&reader->report, offset, "'aspectratio' is ignored; pixels are square");
     if (!dat_number(reader, "antialiasing", &unused) || !dat_number(reader, "raydepth", &unused) ||
         !dat_vector(reader, "center", &block->center) || !dat_vector(reader, "viewdir", &block->view) ||
         !dat_vector(reader, "updir", &block->up))
@@ -69,7 +70,8 @@ bool dat_camera(DatReader *reader)
         const double *f = block.frustum;
         height = f[3] - f[2];
         if (!(f[1] > f[0] && height > 0))
-            return report_error(&reader->report, offset, "'frustum' must be left, right, bottom and top");
+            return report_error(&reader->report, offset,
+                                "'frustum' must be left, right, bottom and top, in ascending pairs");
         reader->scene->camera.shift[0] = (f[0] + f[1]) / 2 / height;
         reader->scene->camera.shift[1] = (f[2] + f[3]) / 2 / height;
         reader->scene->camera.frame_aspect = (f[1] - f[0]) / height;
@@ -98,7 +100,7 @@ static bool fading_read(DatReader *reader, Light *light)
         sum = light->fading[i] < 0 ? -INFINITY : sum + light->fading[i];
     }
     return sum > 0 || report_error(&reader->report, offset,
-                                   "'attenuation' must have numbers of 0 or more, and one above 0");
+                                   "the numbers of 'attenuation' must be 0 or more, and one must be above 0");
 }
 
 static bool light_end(DatReader *reader, Light light)
@@ -107,7 +109,7 @@ static bool light_end(DatReader *reader, Light light)
     if (!dat_expect(reader, "color") || !line_vector(&reader->line, "color", NULL, &light.color))
         return false;
     if (!numbers_are_sound(light.color))
-        return report_error(&reader->report, offset, "'color' must be 0 or more");
+        return report_error(&reader->report, offset, "each number of 'color' must be 0 or more");
     if (light.type != LIGHT_POINT && vector_is_zero(light.direction))
         return report_error(&reader->report, offset, "'direction' must not be zero");
     light_fold_fading(&light);
@@ -121,7 +123,7 @@ static bool light_place_read(DatReader *reader, Light *light)
     if (!dat_vector(reader, "center", &light->position)) return false;
     const size_t offset = value_peek(&reader->line).offset;
     if (!dat_number(reader, "rad", &radius)) return false;
-    if (radius > 0) dat_warn(reader, offset, "lights are not visible themselves");
+    if (radius > 0) dat_warn(reader, offset, "the radius of lights is ignored; they are not visible");
     return true;
 }
 

@@ -25,7 +25,8 @@ Line line_first_of_mesh(Report *report)
 bool line_is_text(const Line *line)
 {
     const char *nul = line->at < line->end ? memchr(line->at, '\0', (size_t)(line->end - line->at)) : NULL;
-    return !nul || report_error(line->report, (size_t)(nul - line->text), "not text: a NUL character");
+    return !nul ||
+           report_error(line->report, (size_t)(nul - line->text), "the file contains a NUL character");
 }
 
 void line_skip(Line *line)
@@ -205,11 +206,11 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, void *v
     word_extend(line, &word);
     if (has_blanks && !line->joins_blanks && comma_count(word) == 2)
         return report_error(line->report, word.offset,
-                            "'%s' has blanks next to commas, '%.*s'; --lenient reads them", name,
+                            "'%s' has blanks next to its commas ('%.*s'); --lenient accepts them", name,
                             WORD_TEXT(word));
     if (comma_count(word) != 2)
         return report_error(line->report, word.offset,
-                            "'%s' must be three numbers with commas between, not '%.*s'", name,
+                            "'%s' must be three numbers separated by commas, not '%.*s'", name,
                             WORD_TEXT(word));
     double values[3];
     for (size_t i = 0, start = 0; i < 3; i++) {
@@ -257,14 +258,15 @@ bool line_elements(Line *line, Scene *scene, void (*read)(void *reader), void *r
 
 bool line_end(Line *line)
 {
-    Word word = line_word(line);
-    if (word.length) report_error(line->report, word.offset, "unexpected '%.*s'", WORD_TEXT(word));
-    return !word.length;
+    const Word word = line_word(line);
+    return !word.length ||
+           report_error(line->report, word.offset, "the line must end before '%.*s'", WORD_TEXT(word));
 }
 
 bool line_is_first(const Line *line, bool *has_one, const char *what)
 {
-    if (*has_one) return report_error(line->report, line->start, "a second %s", what);
+    if (*has_one)
+        return report_error(line->report, line->start, "there is a second %s; only one is allowed", what);
     *has_one = true;
     return true;
 }

@@ -142,5 +142,5 @@ typedef struct {
     size_t count;
 } UnusedWords;
 
-// Warns once per word that the word `what`, such as "is not used".
+// Warns once per word that the word `what`, such as "is ignored".
 void unused_record(UnusedWords *unused, Report *report, Word word, const char *what);

@@ -25,10 +25,10 @@ bool scene_finish(Scene *scene, Report *report, const SceneOptions *options)
     }
     if (!scene->objects.count)
         message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
-                       "no objects: only the background is shown");
+                       "the scene has no objects, so only the background is shown");
     if (!scene->lights.count)
         message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
-                       "no lights: only ambient light and emission are shown");
+                       "the scene has no lights, so only ambient light and emission are shown");
     return true;
 }
 
@@ -92,29 +92,24 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
                              "%s: only values of YAML scenes (.yaml, .yml or .json) can be replaced", path);
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known && !begins_dat(path))
-        return message_error(
-            messages,
-            "%s: a scene's name ends in .yaml, .yml, .json, .rt, .cfg, .nff or .dat, or in a mesh's, such as "
-            ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
-            path);
-    Text text = {0};
+        return message_error(messages,
+                             "%s: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff or "
+                             ".dat, or in a mesh's, such as "
+                             ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
+                             path);
+    OwnedText text = {0};
     stage_begin(options->stage, "reading", path, 0);
-    bool read = text_read_file(&text, path, messages);
-    if (read) {
-        Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
-        read = scene_read(scene, &source, options, messages);
-    }
-    if (read) {
-        scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
-        for (size_t i = 0; i < scene->included.count; i++)
-            scene->text_hash = hash_bytes(scene->text_hash, &scene->included.items[i].hash, sizeof(uint64_t));
-        for (const Source *set = scene->overrides; set; set = set->next)
-            scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
-        if (scene->animation.has_keys)
-            scene->text_hash = hash_bytes(scene->text_hash, &options->frame, sizeof options->frame);
-    }
-    text_free(&text);
-    return read;
+    if (!text_read_file(&text, path, messages)) return false;
+    const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+    if (!scene_read(scene, &source, options, messages)) return false;
+    scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
+    for (size_t i = 0; i < scene->included.count; i++)
+        scene->text_hash = hash_bytes(scene->text_hash, &scene->included.items[i].hash, sizeof(uint64_t));
+    for (const Source *set = scene->overrides; set; set = set->next)
+        scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
+    if (scene->animation.has_keys)
+        scene->text_hash = hash_bytes(scene->text_hash, &options->frame, sizeof options->frame);
+    return true;
 }
 
 // Replaces the camera with that of another scene, whose file counts as included. Drops that scene's
@@ -123,31 +118,28 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
 {
     for (size_t i = 0; i < options->override_count; i++)
         if (strncmp(options->overrides[i], "camera", 6) == 0 && strchr(".[=", options->overrides[i][6]))
-            return message_error(messages, "%s %s: the camera is that of '%s'", options->override_name,
-                                 options->overrides[i], options->camera);
+            return message_error(messages, "%s %s cannot change the camera, which is that of '%s'",
+                                 options->override_name, options->overrides[i], options->camera);
     SceneOptions camera_options = *options;
     camera_options.camera = NULL;
     camera_options.override_count = 0;
     scene_file_named(options, options->camera);
-    Scene other;
-    MessageList found = {0};
-    const bool is_read = file_load(&other, options->camera, &camera_options, &found);
-    if (is_read) {
-        scene->camera = other.camera;
-        scene->animation.has_keys |= other.animation.has_keys;
-        scene->animation.frame = options->frame;
-        if (scene->animation.frame_count == 0) scene->animation.frame_count = other.animation.frame_count;
-        if (scene->animation.frame_rate == 0) scene->animation.frame_rate = other.animation.frame_rate;
-        if (!scene->animation.has_shutter) scene->animation.shutter = other.animation.shutter;
-        scene->text_hash = hash_bytes(scene->text_hash, &other.text_hash, sizeof other.text_hash);
-        const IncludedFile file = {memory_copy_text(options->camera), other.text_hash};
-        array_push(scene->included, file);
-        scene_free(&other);
-    } else {
+    OwnedScene other = {0};
+    OwnedMessageList found = {0};
+    if (!file_load(&other, options->camera, &camera_options, &found)) {
         message_list_move(messages, &found);
+        return false;
     }
-    message_list_free(&found);
-    return is_read;
+    scene->camera = other.camera;
+    scene->animation.has_keys |= other.animation.has_keys;
+    scene->animation.frame = options->frame;
+    if (scene->animation.frame_count == 0) scene->animation.frame_count = other.animation.frame_count;
+    if (scene->animation.frame_rate == 0) scene->animation.frame_rate = other.animation.frame_rate;
+    if (!scene->animation.has_shutter) scene->animation.shutter = other.animation.shutter;
+    scene->text_hash = hash_bytes(scene->text_hash, &other.text_hash, sizeof other.text_hash);
+    const IncludedFile file = {memory_copy_text(options->camera), other.text_hash};
+    array_push(scene->included, file);
+    return true;
 }
 
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)

@@ -72,7 +72,7 @@ static bool view_read(NffReader *reader)
         const size_t index = view_key_index(word);
         if (index == VIEW_KEYS) break;
         const LineField *key = &view_keys[index];
-        if (seen[index]) return report_error(&reader->report, word.offset, "a second '%s'", key->name);
+        if (seen[index]) return report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
         seen[index] = true;
         line_word(&reader->line);
         if (!line_field(&reader->line, key, &view) || !line_end(&reader->line)) return false;
@@ -151,7 +151,7 @@ static bool sphere_read(NffReader *reader)
     if (!line_vector(&reader->line, "center", NULL, &object.as.sphere.center)) return false;
     const size_t offset = value_peek(&reader->line).offset;
     if (!line_number(&reader->line, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
-    if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be 0");
+    if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be zero");
     object.as.sphere.radius = fabs(radius);
     object.as.sphere.only_inside = radius < 0;
     object_add(reader, object);
@@ -172,8 +172,8 @@ static bool cone_read(NffReader *reader)
     Vector3 axis = vector_subtract(apex, base);
     const char *fault = NULL;
     if (vector_is_zero(axis)) fault = "a cone's base and apex must differ";
-    if (base_radius * apex_radius < 0) fault = "a cone's radii must not be of different signs";
-    if (base_radius == 0 && apex_radius == 0) fault = "a cone's radii must not both be 0";
+    if (base_radius * apex_radius < 0) fault = "a cone's radii must not have different signs";
+    if (base_radius == 0 && apex_radius == 0) fault = "a cone's radii must not both be zero";
     if (fault) return report_error(&reader->report, offset, "%s", fault);
     bool only_inside = base_radius < 0 || apex_radius < 0;
     Object object;
@@ -222,10 +222,10 @@ static bool any_polygon_read(NffReader *reader, bool smooth)
     if (!corners_read(reader, smooth)) return false;
     switch (polygon_triangulate(reader->corners.items, reader->corners.count, &reader->triangles)) {
     case POLYGON_WITHOUT_AREA:
-        report_warning(&reader->report, offset, "a degenerate polygon is never hit");
+        report_warning(&reader->report, offset, "the polygon has no area and is never hit");
         break;
     case POLYGON_CROSSED:
-        report_warning(&reader->report, offset, "the polygon intersects itself; only parts are filled");
+        report_warning(&reader->report, offset, "the polygon intersects itself; only parts of it are filled");
         break;
     case POLYGON_CUT:
         break;
@@ -278,10 +278,10 @@ static void element_read(void *context)
     if (reader->has_fault && (is_number || view_key_index(name) < VIEW_KEYS)) return;
     reader->has_fault = true;
     if (is_number)
-        report_error(&reader->report, name.offset, "expected an element, not the number %.*s",
+        report_error(&reader->report, name.offset, "an element is expected, not the number %.*s",
                      WORD_TEXT(name));
     else
-        report_error(&reader->report, name.offset, "unknown element '%.*s'", WORD_TEXT(name));
+        report_error(&reader->report, name.offset, "there is no element '%.*s'", WORD_TEXT(name));
 }
 
 // Sets the intensities, which the format leaves unspecified. Its author proposes this formula for each of n
@@ -308,7 +308,7 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
         if (!line_elements(&reader.line, scene, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_view && !report_is_full(&reader.report))
-            report_error(&reader.report, source->length, "the scene has no view (element 'v')");
+            report_error(&reader.report, source->length, "the scene has no view; an element 'v' adds one");
     }
     lights_finish(&reader);
     free(reader.white_lights.items);

@@ -134,7 +134,8 @@ bool number_read_field(Report *report, Word word, const char *name, const Range 
             return report_error(report, word.offset, "'%s' must be a number, not nothing", name);
         return report_error(report, word.offset, "'%s' must be a number, not '%.*s'", name, WORD_TEXT(word));
     case NUMBER_TOO_LARGE:
-        return report_error(report, word.offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
+        return report_error(report, word.offset, "'%s' must be at most %g in magnitude, not '%.*s'", name,
+                            NUMBER_MAX, WORD_TEXT(word));
     case NUMBER_READ:
         break;
     }

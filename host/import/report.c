@@ -1,6 +1,7 @@
 #include "host/import/report.h"
 #include "host/base/array.h"
 #include "host/base/hash.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 
 #include <stdlib.h>
@@ -10,24 +11,71 @@ enum { MESSAGES_MAX = 20 }; // of each severity
 
 Report report_open(const Source *source, MessageList *messages)
 {
-    return (Report){.source = source, .messages = messages, .first = messages ? messages->count : 0};
+    return (Report){.source = source, .messages = messages};
 }
 
-// Counts a message, and returns whether it is within the limit.
-static bool message_fits(Report *report, MessageSeverity severity)
+bool report_repeats(Report *report, const char *file, uint64_t place, const char *text)
 {
-    size_t *count = severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
-    return (*count)++ < MESSAGES_MAX;
+    uint64_t hash = hash_bytes(HASH_START, &place, sizeof place);
+    hash = hash_bytes(hash, file ? file : "", file ? strlen(file) + 1 : 1);
+    hash = hash_bytes(hash, text, strlen(text));
+    for (size_t i = 0; i < report->known_count; i++)
+        if (report->known[i] == hash) return true;
+    if (report->known_count < REPORT_KNOWN_MAX) report->known[report->known_count++] = hash;
+    return false;
+}
+
+static size_t *severity_count(Report *report, MessageSeverity severity)
+{
+    return severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
+}
+
+// Returns whether the next message of the severity is beyond the limit, and then counts it.
+static bool message_exceeds(Report *report, MessageSeverity severity)
+{
+    size_t *count = severity_count(report, severity);
+    *count += *count >= MESSAGES_MAX;
+    return *count > MESSAGES_MAX;
+}
+
+static bool message_is_before(const Message *a, const Message *b)
+{
+    return a->line != b->line ? a->line < b->line : a->column < b->column;
+}
+
+// Moves the last message behind the last one of the same file that is about no later place, or to the front.
+static void last_message_sort(MessageList *list)
+{
+    const Message last = list->items[list->count - 1];
+    size_t place = list->count - 1;
+    for (; place > 0; place--) {
+        const Message *previous = &list->items[place - 1];
+        if (previous->file && strcmp(previous->file, last.file) == 0 && !message_is_before(&last, previous))
+            break;
+        list->items[place] = *previous;
+    }
+    list->items[place] = last;
+}
+
+// Adds and counts a message unless it repeats one. Those of the report's own file stay in the order of its
+// text.
+static void message_add(Report *report, MessageSeverity severity, size_t offset, const char *text)
+{
+    const Source *source = report->source;
+    if (report_repeats(report, source->file, offset, text)) return;
+    message_add_at(report->messages, severity, source, offset, "%s", text);
+    ++*severity_count(report, severity);
+    const bool is_of_file = offset <= source->length || offset == MESSAGE_WHOLE_FILE;
+    if (report->messages && source->file && is_of_file) last_message_sort(report->messages);
 }
 
 // Adds the formatted arguments after `format` of the function that uses it.
 #define REPORT(report, severity, offset, format)                                                             \
     do {                                                                                                     \
-        char *text;                                                                                          \
-        if (!message_fits(report, severity)) break;                                                          \
+        if (message_exceeds(report, severity)) break;                                                        \
+        OWNED char *text = NULL;                                                                             \
         ARGUMENTS_FORMAT(text, format);                                                                      \
-        message_add_at((report)->messages, severity, (report)->source, offset, "%s", text);                  \
-        free(text);                                                                                          \
+        message_add(report, severity, offset, text);                                                         \
     } while (0)
 
 void report_message(Report *report, MessageSeverity severity, size_t offset, const char *format, ...)
@@ -51,71 +99,6 @@ bool report_is_full(const Report *report)
     return report->error_count >= MESSAGES_MAX;
 }
 
-// Returns the position of the message's file among the sources.
-static size_t message_file(const Report *report, const Message *message)
-{
-    size_t position = 0;
-    for (const Source *source = report->source; source; source = source->next, position++)
-        if (!source->file || !message->file || !strcmp(source->file, message->file)) break;
-    return position;
-}
-
-static bool message_is_before(const Report *report, const Message *a, const Message *b)
-{
-    const size_t file_of_a = message_file(report, a), file_of_b = message_file(report, b);
-    if (file_of_a != file_of_b) return file_of_a < file_of_b;
-    return a->line != b->line ? a->line < b->line : a->column < b->column;
-}
-
-// Returns whether the message repeats one from `first` up to `end`. An alias can produce the same mistake
-// several times.
-static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
-{
-    for (size_t i = first; i < end; i++) {
-        const Message *other = &list->items[i];
-        if (other->line == message->line && other->column == message->column &&
-            !strcmp(other->text, message->text) &&
-            !strcmp(other->file ? other->file : "", message->file ? message->file : ""))
-            return true;
-    }
-    return false;
-}
-
-bool report_repeats(Report *report, const char *file, unsigned line, unsigned column, const char *text)
-{
-    const unsigned place[] = {line, column};
-    uint64_t hash = hash_bytes(HASH_START, place, sizeof place);
-    hash = hash_bytes(hash, file ? file : "", file ? strlen(file) + 1 : 1);
-    hash = hash_bytes(hash, text, strlen(text));
-    for (size_t i = 0; i < report->known_count; i++)
-        if (report->known[i] == hash) return true;
-    if (report->known_count < REPORT_FILE_MESSAGES) report->known[report->known_count++] = hash;
-    return false;
-}
-
-// Sorts the messages into source order and drops repeats.
-static void report_sort(Report *report)
-{
-    MessageList *list = report->messages;
-    size_t kept = report->first;
-    for (size_t i = report->first; i < list->count; i++) {
-        Message message = list->items[i];
-        if (message_is_among(&message, list, report->first, kept)) {
-            message_free(&message); // a repeat
-            continue;
-        }
-        size_t place = kept++;
-        for (; place > report->first && message_is_before(report, &message, &list->items[place - 1]); place--)
-            list->items[place] = list->items[place - 1];
-        list->items[place] = message;
-    }
-    list->count = kept;
-    message_list_move(list, &report->included);
-    if (report_is_full(report))
-        message_add_at(list, MESSAGE_ERROR, report->source, MESSAGE_WHOLE_FILE,
-                       "too many errors; reading stopped");
-}
-
 static size_t warnings_beyond_limit(const Report *report)
 {
     return report->warning_count > MESSAGES_MAX ? report->warning_count - MESSAGES_MAX : 0;
@@ -123,17 +106,19 @@ static size_t warnings_beyond_limit(const Report *report)
 
 void report_include(Report *report, Report *included)
 {
-    report_sort(included);
-    MessageList *from = included->messages, *to = &report->included;
+    MessageList *from = included->messages;
     for (size_t i = 0; i < from->count; i++) {
-        const Message *message = &from->items[i];
-        if (report_repeats(report, message->file, message->line, message->column, message->text) ||
-            !message_fits(report, message->severity))
-            message_free(&from->items[i]);
-        else
-            array_push(*to, *message);
+        Message *message = &from->items[i];
+        const uint64_t place = (uint64_t)message->line << 32 | message->column;
+        if (report_repeats(report, message->file, place, message->text) ||
+            message_exceeds(report, message->severity)) {
+            message_free(message);
+            continue;
+        }
+        array_push(*report->messages, *message);
+        ++*severity_count(report, message->severity);
     }
-    if (!report_repeats(report, included->source->file, 0, 0, "")) // counted once for each file
+    if (!report_repeats(report, included->source->file, 0, "")) // counted once for each file
         report->warning_count += warnings_beyond_limit(included);
     free(from->items);
     *from = (MessageList){0};
@@ -141,10 +126,12 @@ void report_include(Report *report, Report *included)
 
 bool report_close(Report *report)
 {
-    report_sort(report);
+    if (report_is_full(report))
+        message_add_at(report->messages, MESSAGE_ERROR, report->source, MESSAGE_WHOLE_FILE,
+                       "only the first %d errors are reported; there may be more", MESSAGES_MAX);
     const size_t more = warnings_beyond_limit(report);
     if (more > 0)
         message_add_at(report->messages, MESSAGE_WARNING, report->source, MESSAGE_WHOLE_FILE,
-                       "%zu more warnings are not shown", more);
+                       "%zu more warning%s %s not shown", more, text_plural(more), text_is_are(more));
     return report->error_count == 0;
 }

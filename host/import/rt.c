@@ -32,7 +32,7 @@ static bool unit_vector_read(Line *line, const char *name, Vector3 *axis)
     size_t offset = line_peek(line).offset;
     if (!line_comma_vector(line, name, &range_axis, axis)) return false;
     if (!vector_is_zero(*axis) && fabs(vector_length(*axis) - 1) > tolerated)
-        report_warning(line->report, offset, "'%s' is not a unit vector; normalized", name);
+        report_warning(line->report, offset, "'%s' is not a unit vector; it is normalized", name);
     *axis = vector_normalize(*axis);
     return true;
 }
@@ -40,9 +40,8 @@ static bool unit_vector_read(Line *line, const char *name, Vector3 *axis)
 static bool axis_read(Line *line, const char *name, Vector3 *axis)
 {
     size_t offset = line_peek(line).offset;
-    if (!unit_vector_read(line, name, axis)) return false;
-    if (vector_is_zero(*axis)) report_error(line->report, offset, "'%s' must not be zero", name);
-    return !vector_is_zero(*axis);
+    return unit_vector_read(line, name, axis) &&
+           (!vector_is_zero(*axis) || report_error(line->report, offset, "'%s' must not be zero", name));
 }
 
 // Requires the end of the line. With --lenient, skips the rest, such as textures.
@@ -50,10 +49,10 @@ static bool element_end(RtReader *reader)
 {
     const Word first = line_peek(&reader->line);
     if (!reader->lenient && first.length > 0)
-        return report_error(&reader->report, first.offset, "unexpected '%.*s'; --lenient skips it",
-                            WORD_TEXT(first));
+        return report_error(&reader->report, first.offset,
+                            "the line must end before '%.*s'; --lenient skips it", WORD_TEXT(first));
     for (Word word; (word = line_word(&reader->line)).length;)
-        report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
+        report_warning(&reader->report, word.offset, "'%.*s' is skipped", WORD_TEXT(word));
     return true;
 }
 
@@ -86,7 +85,7 @@ static bool ratio_read(RtReader *reader, double *ratio)
     const size_t offset = line_peek(&reader->line).offset;
     const Range *range = reader->lenient ? &range_not_negative : &range_ratio;
     if (!line_number(&reader->line, "ratio", range, ratio)) return false;
-    if (*ratio > 1) report_warning(&reader->report, offset, "'ratio' is above 1; used unchanged");
+    if (*ratio > 1) report_warning(&reader->report, offset, "'ratio' is above 1; it is used unchanged");
     return true;
 }
 
@@ -195,7 +194,7 @@ static bool cylinder_read(RtReader *reader)
     const bool color_first = memchr(third.text, ',', third.length) != NULL;
     if (color_first) {
         report_warning(&reader->report, third.offset,
-                       "the color precedes the diameter and the height; accepted");
+                       "the color is accepted although it precedes the diameter and the height");
         if (!color_read(line, &material.color)) return false;
     }
     if (!line_number(line, "diameter", &range_positive, &diameter) ||
@@ -288,9 +287,10 @@ static void element_read(void *context)
         }
     }
     if (reader->lenient)
-        report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", WORD_TEXT(name));
+        report_warning(&reader->report, name.offset, "there is no element '%.*s'; it is skipped",
+                       WORD_TEXT(name));
     else
-        report_error(&reader->report, name.offset, "unknown element '%.*s'; --lenient skips it",
+        report_error(&reader->report, name.offset, "there is no element '%.*s'; --lenient skips it",
                      WORD_TEXT(name));
 }
 
@@ -304,7 +304,8 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
         if (!line_elements(&reader.line, scene, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_camera && !report_is_full(&reader.report))
-            report_error(&reader.report, source->length, "no camera: a line with C");
+            report_error(&reader.report, source->length,
+                         "the scene has no camera; a line that begins with C adds one");
     }
     return scene_finish(scene, &reader.report, options);
 }

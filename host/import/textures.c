@@ -82,31 +82,29 @@ static bool colors_are_finite(const Image *image)
 }
 
 // Describes why an image cannot join a scene whose other images have `texel_count` texels. Returns NULL if
-// it can.
-static const char *image_problem(const Image *image, size_t texel_count)
+// it can. The caller frees it.
+static char *image_problem(const Image *image, size_t texel_count)
 {
     if (image->width > TEXTURE_SIDE_MAX || image->height > TEXTURE_SIDE_MAX)
-        return "a side of more than 65536 texels";
+        return text_format("has a side of more than %d texels", TEXTURE_SIDE_MAX);
     if ((size_t)image->width * image->height > TEXELS_MAX - texel_count)
-        return "too many texels in all textures";
-    return colors_are_finite(image) ? NULL : "a color is not finite";
+        return text_format("brings the scene's textures to more than %d texels in total", TEXELS_MAX);
+    return colors_are_finite(image) ? NULL : text_format("has a color that is not finite");
 }
 
 // Decodes an image and adds its texels to the count. Moves its reader's messages to its place in the scene.
 // Returns false if it cannot be used.
 static bool texture_decode(SceneTexture *texture, size_t *texel_count, uint32_t max_pixels, Report *report)
 {
-    MessageList problems = {0};
-    const size_t offset = texture->offset;
-    bool is_usable = texture->image.values || texture_read(texture, max_pixels, &problems);
+    OwnedMessageList problems = {0};
+    const bool is_read = texture->image.values || texture_read(texture, max_pixels, &problems);
     for (size_t i = 0; i < problems.count; i++)
-        report_message(report, problems.items[i].severity, offset, "%s", problems.items[i].text);
-    message_list_free(&problems);
+        report_message(report, problems.items[i].severity, texture->offset, "%s", problems.items[i].text);
     text_free(&texture->bytes);
     const Image *image = &texture->image;
-    const char *problem = is_usable ? image_problem(image, *texel_count) : NULL;
-    if (problem) is_usable = report_error(report, offset, "cannot use '%s': %s", texture->path, problem);
-    if (!is_usable) return false;
+    OWNED char *problem = is_read ? image_problem(image, *texel_count) : NULL;
+    if (problem) report_error(report, texture->offset, "'%s' %s", texture->path, problem);
+    if (!is_read || problem) return false;
     *texel_count += (size_t)image->width * image->height;
     if (!image->alpha && texture->content == TEXTURE_OPACITY) alpha_by_luminance(&texture->image);
     if (texture->content == TEXTURE_BUMPS && image_is_gray(image)) normals_of_heights(&texture->image);
@@ -150,10 +148,10 @@ static bool is_translucent(const Image *image)
 // Returns the warning that an image's alpha requires, or NULL if it requires none.
 static const char *alpha_warning(const Image *image, const AlphaUse *use)
 {
-    if (image->alpha && use->is_ignored) return "is ignored: its transparent parts are opaque";
+    if (image->alpha && use->is_ignored) return "is ignored, so its transparent parts are opaque";
     if (use->cuts && use->blends && is_translucent(image))
-        return "does not blend: below 0.5 the surface is cut out, elsewhere it is opaque";
-    return use->is_requested && !image->alpha ? "is 1 everywhere: nothing is cut out" : NULL;
+        return "does not blend; the surface is cut out where it is below 0.5 and opaque elsewhere";
+    return use->is_requested && !image->alpha ? "is 1 everywhere, so nothing is cut out" : NULL;
 }
 
 // Removes the holes of opaque images, so that kernels need not look for them.
@@ -169,7 +167,7 @@ static void cutouts_prune(Scene *scene)
 
 void textures_decode(Scene *scene, Report *report, const SceneOptions *options)
 {
-    AlphaUse *uses = alpha_uses(scene);
+    OWNED AlphaUse *uses = alpha_uses(scene);
     size_t texel_count = 0;
     for (size_t i = 0; i < scene->textures.count && !report_is_full(report); i++) {
         SceneTexture *texture = &scene->textures.items[i];
@@ -178,7 +176,6 @@ void textures_decode(Scene *scene, Report *report, const SceneOptions *options)
         const char *warning = alpha_warning(&texture->image, &uses[i + 1]);
         if (warning) report_warning(report, texture->offset, "the alpha of '%s' %s", texture->path, warning);
     }
-    free(uses);
     cutouts_prune(scene);
     if (report->error_count > 0) return;
     if (scene->sky.is_ambient) scene->ambient = sky_mean(scene);

@@ -135,7 +135,7 @@ static bool shape_fits(Object *object)
 
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
 {
-    static const char *const out_of_range = "gets a size of 0 or a number beyond 1e30";
+    static const char *const out_of_range = "would have a size of 0 or a number above 1e30 in magnitude";
     if (object->type == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
     if (object->type == SHAPE_MESH) {
         Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
@@ -145,7 +145,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
     }
     if (!shape_transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
-            return "with an image would become another shape, which cannot have images";
+            return "would no longer be one, so it cannot have an image";
         oval_make(object);
         oval_transform(object, affine);
     }
@@ -153,5 +153,5 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
     const ShapeMembers members = shape_members(object);
     return object->type == SHAPE_TRIANGLE || !members.directions[2] || axes_are_moderate(*members.directions)
                ? NULL
-               : "gets thinner than a millionth of its length, or leans by more than 89.9 degrees";
+               : "would be thinner than a millionth of its length or lean by more than 89.9 degrees";
 }

@@ -52,7 +52,7 @@ static void warn_default(const Importer *importer, const char *what)
 {
     struct aiString name = {0};
     aiGetMaterialString(importer->material, AI_MATKEY_NAME, &name);
-    draft_warn(importer->draft, "a %s of material '%.40s' is out of range: the default is used", what,
+    draft_warn(importer->draft, "a %s of material '%.40s' is out of range; the default is used", what,
                name.data);
 }
 
@@ -104,10 +104,9 @@ static uint32_t texture_add(const Importer *importer, const char *name, const ch
         return draft_add_embedded_texture(draft, &bytes, TEXTURE_COLORS, name);
     }
     bool is_moved;
-    char *path = draft_find_file(draft->import->path, name, strlen(name), &is_moved);
+    OWNED char *path = draft_find_file(draft->import->path, name, strlen(name), &is_moved);
     const uint32_t texture = draft_add_texture(draft, path, TEXTURE_COLORS, owner);
-    if (is_moved && texture > 0) draft_warn(draft, "%s: no '%.100s': '%.100s' is used", owner, name, path);
-    free(path);
+    if (is_moved && texture > 0) draft_warn(draft, "%s: " DRAFT_MOVED_FILE, owner, 100, name, path);
     return texture;
 }
 
@@ -128,7 +127,7 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
     for (int type = aiTextureType_DIFFUSE; type <= AI_TEXTURE_TYPE_MAX; type++)
         if (type != aiTextureType_BASE_COLOR && type != aiTextureType_DIFFUSE &&
             aiGetMaterialTextureCount(from, (enum aiTextureType)type) > 0)
-            draft_warn(importer->draft, "textures of anything but the color are not used");
+            draft_warn(importer->draft, "all textures except those of the color are ignored");
     if (aiGetMaterialTextureCount(from, color) == 0) return;
     struct aiString path = {0};
     enum aiTextureMapMode modes[2] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
@@ -137,7 +136,7 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
         aiReturn_SUCCESS)
         return;
     aiGetMaterialUVTransform(from, AI_MATKEY_UVTRANSFORM(color, 0), &to->uv_transform);
-    if (to->uv_transform.mRotation != 0) draft_warn(importer->draft, "rotations of textures are not used");
+    if (to->uv_transform.mRotation != 0) draft_warn(importer->draft, "rotations of textures are ignored");
     if (to->uv_set >= AI_MAX_NUMBER_OF_TEXTURECOORDS) to->uv_set = 0;
     wraps[0] = wrap_of(modes[0]);
     wraps[1] = wrap_of(modes[1]);
@@ -234,8 +233,8 @@ static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct a
     const unsigned count = face->mNumIndices;
     for (unsigned i = 0; i < count; i++)
         if (face->mIndices[i] >= from->mNumVertices)
-            return draft_refuse(draft, "a face names vertex %u (from 0); there are %u", face->mIndices[i],
-                                from->mNumVertices);
+            return draft_refuse(draft, "a face names vertex %u (counted from 0), but its mesh has only %u",
+                                face->mIndices[i], from->mNumVertices);
     const bool has_area = face_has_area(from, face);
     for (unsigned i = 0; i < count; i++) {
         const unsigned index = face->mIndices[!has_area ? 0 : mirrored ? (count - i) % count : i];
@@ -248,23 +247,21 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
 {
     MeshDraft *draft = importer->draft;
     const size_t first = draft->positions.count;
-    if (first + from->mNumVertices >= DRAFT_NONE) return draft_refuse(draft, "too many vertices");
+    if (first + from->mNumVertices > DRAFT_VERTICES_MAX) return draft_refuse_vertices(draft);
     if (importer->materials && from->mMaterialIndex >= importer->file->mNumMaterials)
-        return draft_refuse(draft, "material %u (from 0) is not there", from->mMaterialIndex);
+        return draft_refuse(draft, "a mesh names material %u (counted from 0), but the file has only %u",
+                            from->mMaterialIndex, importer->file->mNumMaterials);
     const ImportedMaterial *material =
         importer->materials ? material_use(importer, from->mMaterialIndex) : NULL;
     if (material) {
         const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
-        if (material->texture > 0 && !is_textured)
-            draft_warn(importer->draft, "the mesh lacks a texture's coordinates: the color is used");
+        if (material->texture > 0 && !is_textured) draft_warn(importer->draft, "%s", draft_no_uvs);
         array_push(draft->materials,
                    ((DraftMaterialRun){draft->face_start, material->scene_index[is_textured]}));
     }
-    if (from->mNumBones > 0)
-        draft_warn(importer->draft, "skins are not applied: the mesh keeps its own shape, at its node");
-    if (from->mNumAnimMeshes > 0)
-        draft_warn(importer->draft, "morph targets are not applied: the mesh keeps its own shape");
-    if (from->mColors[0]) draft_warn(importer->draft, "vertex colors are not used: the material's color is");
+    if (from->mNumBones > 0) draft_warn(importer->draft, "%s", draft_skins);
+    if (from->mNumAnimMeshes > 0) draft_warn(importer->draft, "%s", draft_morphs);
+    if (from->mColors[0]) draft_warn(importer->draft, "%s", draft_colors);
     vertices_add(draft, from, affine, material);
     const bool mirrored = affine_determinant(affine) < 0;
     for (unsigned i = 0; i < from->mNumFaces; i++)
@@ -281,7 +278,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         const struct aiCamera *camera = file->mCameras[i];
         if (strcmp(camera->mName.data, node->mName.data) != 0) continue;
         if (view->has_camera) {
-            draft_warn(importer->draft, "only the first camera is used");
+            draft_warn(importer->draft, "%s", draft_cameras);
             continue;
         }
         view->camera = (Camera){.up = affine_direction(affine, vector_of(&camera->mUp)),
@@ -298,7 +295,8 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
                    is_spot = light->mType == aiLightSource_SPOT;
         if (strcmp(light->mName.data, node->mName.data) != 0) continue;
         if (!is_sun && !is_spot && light->mType != aiLightSource_POINT) {
-            draft_warn(importer->draft, "the light '%.40s' is neither directional, point nor spot: not used",
+            draft_warn(importer->draft,
+                       "the light '%.40s' is neither directional, point nor spot; it is ignored",
                        light->mName.data);
             continue;
         }
@@ -339,10 +337,9 @@ static bool file_add(Importer *importer)
         for (size_t i = 0; i < material_count; i++)
             importer->materials[i] = (ImportedMaterial){.scene_index = {DRAFT_NONE, DRAFT_NONE}};
     }
-    if (importer->file->mNumAnimations > 0)
-        draft_warn(importer->draft, "animations are not played: nodes keep their pose in the file");
+    if (importer->file->mNumAnimations > 0) draft_warn(importer->draft, "%s", draft_animations);
     if (!importer->draft->import->view && importer->file->mNumCameras + importer->file->mNumLights > 0)
-        draft_warn(importer->draft, "cameras and lights of a mesh are not used: those of the scene are");
+        draft_warn(importer->draft, "%s", draft_view);
     const bool added =
         !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &affine_identity);
     free(importer->materials);
@@ -360,8 +357,8 @@ bool assimp_read(MeshDraft *draft)
 {
     const char *path = draft->import->path;
     if (!assimp_knows(path))
-        return draft_refuse(draft,
-                            "no mesh that is known by its ending: .obj, .ply, .stl, .gltf, .fbx, .dae, …");
+        return draft_refuse(
+            draft, "a mesh's name must have a known ending, such as .obj, .ply, .stl, .gltf, .fbx or .dae");
     Importer importer = {.draft = draft, .file = aiImportFile(path, 0)};
     if (!importer.file) {
         const char *error = aiGetErrorString();

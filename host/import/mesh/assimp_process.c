@@ -110,13 +110,13 @@ static bool child_fails(MeshDraft *draft, int status)
 {
     const int by = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
     if (by == SIGXCPU)
-        return draft_refuse(draft, "assimp needs more than %d s of processor time to read it",
+        return draft_refuse(draft, "assimp needs more than %d s of processor time to read the file",
                             ASSIMP_PROCESSOR_SECONDS_MAX);
     if (by == SIGALRM)
-        return draft_refuse(draft, "assimp needs more than %d s to read it", ASSIMP_SECONDS_MAX);
+        return draft_refuse(draft, "assimp needs more than %d s to read the file", ASSIMP_SECONDS_MAX);
     if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
-        return draft_refuse(draft, "assimp needs more than %d MiB to read it", ASSIMP_MEBIBYTES_MAX);
-    return draft_refuse(draft, "assimp %s while reading it", by != 0 ? "crashed" : "failed");
+        return draft_refuse(draft, "assimp needs more than %d MiB to read the file", ASSIMP_MEBIBYTES_MAX);
+    return draft_refuse(draft, "assimp %s while reading the file", by != 0 ? "crashed" : "failed");
 }
 
 bool assimp_process_read(MeshDraft *draft)
@@ -125,7 +125,8 @@ bool assimp_process_read(MeshDraft *draft)
     pid_t process = -1;
     int descriptor = -1, status = 0;
     const int error = child_start(draft, &process, &descriptor);
-    if (error != 0) return draft_refuse(draft, "no process to read it in: %s", strerror(error));
+    if (error != 0)
+        return draft_refuse(draft, "cannot start a process to read the file: %s", strerror(error));
     FILE *reply = fdopen(descriptor, "rb");
     bool read = false;
     const bool is_whole = reply && assimp_reply_read(draft, reply, &read);

@@ -1,5 +1,6 @@
 #include "host/import/mesh/draft.h"
 #include "host/base/file.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/image/image.h"
 
@@ -10,44 +11,51 @@
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
 
+const char draft_animations[] = "animations are not played; nodes keep their pose in the file",
+           draft_skins[] = "skins are ignored; the mesh keeps its shape at its node",
+           draft_morphs[] = "morph targets are ignored; the mesh keeps its shape",
+           draft_colors[] = "vertex colors are ignored; the material's color is used",
+           draft_view[] = "cameras and lights of a mesh are ignored; those of the scene are used",
+           draft_cameras[] = "only the first camera is used",
+           draft_no_uvs[] = "the mesh has no coordinates for its texture; the material's color is used";
+
 static void draft_report(const MeshDraft *draft, MessageSeverity severity, const char *text)
 {
     const MeshImport *import = draft->import;
     const bool is_scene = import->offset == MESSAGE_WHOLE_FILE; // whose path the report adds
-    if (!report_repeats(import->report, import->path, severity, 0, text))
+    if (!report_repeats(import->report, import->path, severity, text))
         report_message(import->report, severity, import->offset, "%s%s%s", is_scene ? "" : import->path,
                        is_scene ? "" : ": ", text);
 }
 
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
     draft_report(draft, MESSAGE_ERROR, text);
-    free(text);
     return false;
+}
+
+bool draft_refuse_vertices(MeshDraft *draft)
+{
+    return draft_refuse(draft, "the mesh has too many vertices; at most %u are supported",
+                        DRAFT_VERTICES_MAX);
 }
 
 void draft_warn(MeshDraft *draft, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
     draft_report(draft, MESSAGE_WARNING, text);
-    free(text);
 }
 
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
-    if (draft->places == DRAFT_NO_PLACES)
-        draft_refuse(draft, "%s", text);
-    else if (draft->places == DRAFT_BYTES)
-        draft_refuse(draft, "byte %zu: %s", offset, text);
-    else
-        report_error(&draft->report, offset, "%s", text);
-    free(text);
-    return false;
+    return draft->places == DRAFT_NO_PLACES ? draft_refuse(draft, "%s", text)
+           : draft->places == DRAFT_BYTES   ? draft_refuse(draft, "byte %zu: %s", offset, text)
+                                            : report_error(&draft->report, offset, "%s", text);
 }
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part)
@@ -83,8 +91,9 @@ static void indices_drop(MeshDraft *draft, DraftPart part)
     if (kept == 0) indices->count = 0;
     if (needed->index > count)
         report_warning(&draft->report, needed->offset,
-                       "a face names %s %zu (from %zu); there are %zu: not used", draft_part_names[part],
-                       needed->index - 1 + draft->first_index, draft->first_index, count);
+                       "a face names %s %zu (counted from %zu), but the file has only %zu; it is ignored",
+                       draft_part_names[part], needed->index - 1 + draft->first_index, draft->first_index,
+                       count);
     draft->needed[part].index = 0;
 }
 
@@ -119,39 +128,47 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 {
     const char *slash = strrchr(from, '/');
     const int folder_length = slash ? (int)(slash + 1 - from) : 0;
-    char *given = text_format("%.*s", (int)length, name);
+    OWNED char *given = text_format("%.*s", (int)length, name);
     for (char *at = given; *at; at++)
         if (*at == '\\') *at = '/';
-    char *path = text_format("%.*s%s", is_absolute(given) ? 0 : folder_length, from, given),
-         *near = text_format("%.*s%s", folder_length, from, file_base_name(given));
+    OWNED char *path = text_format("%.*s%s", is_absolute(given) ? 0 : folder_length, from, given);
+    OWNED char *near = text_format("%.*s%s", folder_length, from, file_base_name(given));
     *is_moved = file_obstacle(path) && !file_obstacle(near);
-    free(given);
-    free(*is_moved ? path : near);
-    return *is_moved ? near : path;
+    return memory_release(*is_moved ? &near : &path);
 }
 
 const char *texture_fallback(TextureContent content)
 {
-    return content == TEXTURE_COLORS    ? "the color is used"
+    return content == TEXTURE_COLORS    ? "the material's color is used"
            : content == TEXTURE_OPACITY ? "nothing is cut out"
                                         : "normals are not tilted";
 }
 
-static uint32_t texture_add(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
+char *texture_obstacle(const char *path, TextureContent content)
+{
+    const char *obstacle = file_obstacle(path), *fallback = texture_fallback(content);
+    return obstacle ? text_format("cannot read '%.100s': %s; %s", path, obstacle, fallback)
+           : image_is_known(path)
+               ? NULL
+               : text_format("'%.100s' is not a PNG, JPEG, PPM or EXR; %s", path, fallback);
+}
+
+uint32_t draft_add_checked_texture(MeshDraft *draft, const char *path, TextureContent content,
+                                   const char *owner)
 {
     const uint32_t texture = scene_add_texture(draft->scene, path, NULL, content, draft->import->offset);
     if (texture == 0)
-        draft_warn(draft, "%s: too many images in one scene: %s", owner, texture_fallback(content));
+        draft_warn(draft, "%s: a scene may have at most %d images; %s", owner, SCENE_TEXTURES_MAX,
+                   texture_fallback(content));
     return texture;
 }
 
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
 {
     scene_file_named(draft->import->options, path);
-    const char *obstacle = file_obstacle(path);
-    if (!obstacle && image_is_known(path)) return texture_add(draft, path, content, owner);
-    draft_warn(draft, "%s: cannot read '%.100s': %s: %s", owner, path,
-               obstacle ? obstacle : "not a PNG, JPEG, PPM or EXR", texture_fallback(content));
+    OWNED char *obstacle = texture_obstacle(path, content);
+    if (!obstacle) return draft_add_checked_texture(draft, path, content, owner);
+    draft_warn(draft, "%s: %s", owner, obstacle);
     return 0;
 }
 
@@ -159,12 +176,12 @@ uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, Textu
                                     const char *owner)
 {
     if (!image_bytes_are_known(bytes->bytes, bytes->length)) {
-        draft_warn(draft, "%s: not a PNG, JPEG, PPM or EXR: %s", owner, texture_fallback(content));
+        draft_warn(draft, "%s: the image is not a PNG, JPEG, PPM or EXR; %s", owner,
+                   texture_fallback(content));
         return 0;
     }
-    char *path = text_format("%s: %s", draft->import->path, owner);
-    const uint32_t texture = texture_add(draft, path, content, owner);
-    free(path);
+    OWNED char *path = text_format("%s: %s", draft->import->path, owner);
+    const uint32_t texture = draft_add_checked_texture(draft, path, content, owner);
     Text *copy = texture > 0 ? &draft->scene->textures.items[texture - 1].bytes : NULL;
     if (copy && copy->count == 0) text_append(copy, bytes->bytes, bytes->length);
     return texture;
@@ -174,7 +191,8 @@ bool draft_end_face(MeshDraft *draft, size_t offset)
 {
     const size_t first = draft->face_start, count = draft->corners[DRAFT_POSITION].count - first;
     if (count > DRAFT_POLYGON_MAX)
-        return draft_fails(draft, offset, "a face of %zu corners; %d is the most", count, DRAFT_POLYGON_MAX);
+        return draft_fails(draft, offset, "a face has %zu corners; at most %d are supported", count,
+                           DRAFT_POLYGON_MAX);
     if (count < 3) {
         if (count > 0 && !draft->has_short_faces)
             draft_warn(draft, "faces of one or two corners are not shown");

@@ -6,7 +6,8 @@
 #include "host/import/mesh/mesh_import.h"
 
 // Marks a corner without a normal or without texture coordinates.
-#define DRAFT_NONE UINT32_MAX
+#define DRAFT_NONE         UINT32_MAX
+#define DRAFT_VERTICES_MAX (DRAFT_NONE - 1)
 
 typedef enum { DRAFT_POSITION, DRAFT_UV, DRAFT_NORMAL, DRAFT_PART_COUNT } DraftPart;
 
@@ -72,6 +73,8 @@ bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
 // returns false.
 bool draft_refuse(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Reports that there are more vertices than DRAFT_VERTICES_MAX and returns false.
+bool draft_refuse_vertices(MeshDraft *draft);
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part);
 // Starts a part's list, with DRAFT_NONE for all corners before `corner`.
@@ -91,7 +94,7 @@ void draft_drop_missing(MeshDraft *draft);
 // with an error if there are too many vertices.
 static inline bool draft_add_vertex(MeshDraft *draft, Vector3 position, size_t unread)
 {
-    if (draft->positions.count == DRAFT_NONE - 1) return draft_refuse(draft, "too many vertices");
+    if (draft->positions.count == DRAFT_VERTICES_MAX) return draft_refuse_vertices(draft);
     if (unread > 0) array_push(draft->unread, ((DraftPlace){draft->positions.count, unread}));
     array_push(draft->positions, unread > 0 ? vector_all(NAN) : position);
     return true;
@@ -132,10 +135,21 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 
 // Describes the replacement of a missing texture, for messages.
 const char *texture_fallback(TextureContent content);
+// Describes why no image can be read from a file, and what replaces it. Returns NULL if one can. The caller
+// frees it.
+char *texture_obstacle(const char *path, TextureContent content);
 
-// Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
-// warning at `owner` if the image cannot be used.
+// The messages that several readers have.
+extern const char draft_animations[], draft_skins[], draft_morphs[], draft_colors[], draft_view[],
+    draft_cameras[], draft_no_uvs[];
+// With the name of a missing file, as WORD_TEXT gives it, and the path of another one.
+#define DRAFT_MOVED_FILE "'%.*s' does not exist; '%s' is used"
+
+// Adds an image to the scene's textures, from a file, also one that was checked, or from bytes, which are
+// copied. Returns 0 with a warning at `owner` if the image cannot be used.
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner);
+uint32_t draft_add_checked_texture(MeshDraft *draft, const char *path, TextureContent content,
+                                   const char *owner);
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
                                     const char *owner);
 

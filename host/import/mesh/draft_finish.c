@@ -21,9 +21,9 @@ static bool indices_are_sound(MeshDraft *draft)
         const DraftPlace *needed = &draft->needed[part];
         const size_t count = draft_part_count(draft, part);
         if (needed->index > count)
-            return draft_fails(draft, needed->offset, "a face names %s %zu (from %zu); there are %zu",
-                               draft_part_names[part], needed->index - 1 + draft->first_index,
-                               draft->first_index, count);
+            return draft_fails(
+                draft, needed->offset, "a face names %s %zu (counted from %zu), but the file has only %zu",
+                draft_part_names[part], needed->index - 1 + draft->first_index, draft->first_index, count);
     }
     return true;
 }
@@ -42,14 +42,17 @@ static bool position_fails(MeshDraft *draft, uint32_t position)
             ? bsearch(&wanted, draft->unread.items, draft->unread.count, sizeof wanted, places_compare)
             : NULL;
     if (!place)
-        return draft_refuse(draft, "vertex %zu (from %zu) is not finite or too large",
-                            position + draft->first_index, draft->first_index);
+        return draft_refuse(draft,
+                            "vertex %zu (counted from %zu) has a coordinate that is not a number of at most "
+                            "%g in magnitude",
+                            position + draft->first_index, draft->first_index, NUMBER_MAX);
     Line line = line_first_of_mesh(&draft->report);
     line.at = line.text + place->offset;
     const Word word = line_word(&line);
     if (word.length == 0) return draft_fails(draft, place->offset, "a coordinate of the vertex is missing");
-    return draft_fails(draft, place->offset, "'%.*s' is not a coordinate: a number up to %g", WORD_TEXT(word),
-                       NUMBER_MAX);
+    return draft_fails(draft, place->offset,
+                       "a coordinate must be a number of at most %g in magnitude, not '%.*s'", NUMBER_MAX,
+                       WORD_TEXT(word));
 }
 
 // Checks the positions that faces use.
@@ -81,9 +84,11 @@ static void parts_repair(MeshDraft *draft)
         normal_count++;
     }
     if (uv_count > 0)
-        draft_warn(draft, "texture coordinates that are not finite or too large, read as 0: %zu", uv_count);
+        draft_warn(draft, "%zu texture coordinate%s %s not finite or too large and %s read as 0", uv_count,
+                   text_plural(uv_count), text_is_are(uv_count), text_is_are(uv_count));
     if (normal_count > 0)
-        draft_warn(draft, "normals that are not finite or too large, not used: %zu", normal_count);
+        draft_warn(draft, "%zu normal%s %s not finite or too large and %s ignored", normal_count,
+                   text_plural(normal_count), text_is_are(normal_count), text_is_are(normal_count));
 }
 
 // Collects the corners after polygons are cut into triangles.
@@ -315,11 +320,14 @@ static bool triangles_fit(MeshDraft *draft)
     }
     if (squared_corners > squared_corners_max)
         return draft_refuse(
-            draft, "polygons have too many corners: their squared counts sum to %zu; at most %zu is allowed",
+            draft,
+            "the polygons have too many corners; the sum of their squared counts is %zu, but at "
+            "most %zu is supported",
             squared_corners, squared_corners_max);
-    if (corner_count == 0) return draft_refuse(draft, "no triangles");
+    if (corner_count == 0) return draft_refuse(draft, "the mesh has no triangles");
     return corner_count / 3 <= TRIANGLES_MAX ||
-           draft_refuse(draft, "%zu triangles, more than %d", corner_count / 3, TRIANGLES_MAX);
+           draft_refuse(draft, "the mesh has %zu triangles; at most %d are supported", corner_count / 3,
+                        TRIANGLES_MAX);
 }
 
 bool draft_check(MeshDraft *draft)

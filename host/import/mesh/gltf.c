@@ -19,32 +19,38 @@ static const char *const extensions_read[] = {
 
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
+    gltf->has_failed |= !gltf->is_optional;
     if (gltf->is_optional)
-        draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
+        draft_warn(gltf->draft, "%s %s; it is ignored", item->path, text);
     else
-        draft_refuse(gltf->draft, "%s: %s", item->path, text);
-    free(text);
+        draft_refuse(gltf->draft, "%s %s", item->path, text);
     return false;
 }
 
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
-    char *text;
+    OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
-    draft_warn(gltf->draft, "%s: %s", item->path, text);
-    free(text);
+    draft_warn(gltf->draft, "%s %s", item->path, text);
 }
 
 void gltf_warn_once(Gltf *gltf, const GltfItem *item, const char *text)
 {
-    if (!report_repeats(&gltf->draft->report, NULL, 0, 0, text)) gltf_warn(gltf, item, "%s", text);
+    if (!report_repeats(&gltf->draft->report, NULL, 0, text))
+        draft_warn(gltf->draft, "%s: %s", item->path, text);
+}
+
+// Returns the JSON value, or NULL for null, which some writers have in place of a missing value.
+static const json_t *json_not_null(const json_t *json)
+{
+    return json_is_null(json) ? NULL : json;
 }
 
 GltfItem gltf_member(const GltfItem *item, const char *key)
 {
-    GltfItem member = {.json = json_object_get(item->json, key)};
+    GltfItem member = {.json = json_not_null(json_object_get(item->json, key))};
     const int length =
         snprintf(member.path, sizeof member.path, "%s%s", item->path, item->path[0] ? "." : "");
     if (length < (int)sizeof member.path)
@@ -52,36 +58,73 @@ GltfItem gltf_member(const GltfItem *item, const char *key)
     return member;
 }
 
-GltfItem gltf_element(const GltfItem *item, size_t index)
+static GltfItem gltf_any_element(const GltfItem *item, size_t index)
 {
-    GltfItem element = {.json = json_array_get(item->json, index)};
+    GltfItem element = {.json = json_not_null(json_array_get(item->json, index))};
     const int length = snprintf(element.path, sizeof element.path, "%s", item->path);
     if (length < (int)sizeof element.path)
         snprintf(element.path + length, sizeof element.path - (size_t)length, "[%zu]", index);
     return element;
 }
 
-static GltfItem gltf_root_member(const Gltf *gltf, const char *key)
+// Returns the item. Reports one of another type and returns it as missing.
+static GltfItem item_of_type(Gltf *gltf, GltfItem item, json_type type)
 {
-    const GltfItem root = {.json = gltf->root};
-    return gltf_member(&root, key);
+    static const char *const names[] = {
+        [JSON_OBJECT] = "an object", [JSON_ARRAY] = "an array", [JSON_STRING] = "a string"};
+    if (item.json && json_typeof(item.json) != type) {
+        gltf_fails(gltf, &item, "must be %s", names[type]);
+        item.json = NULL;
+    }
+    return item;
 }
 
-GltfItem gltf_entry(const Gltf *gltf, const char *array, size_t index)
+GltfItem gltf_object(Gltf *gltf, const GltfItem *item, const char *key)
 {
-    const GltfItem entries = gltf_root_member(gltf, array);
-    return gltf_element(&entries, index);
+    return item_of_type(gltf, gltf_member(item, key), JSON_OBJECT);
 }
 
-size_t gltf_count(const Gltf *gltf, const char *array)
+GltfItem gltf_array(Gltf *gltf, const GltfItem *item, const char *key)
 {
-    return json_array_size(json_object_get(gltf->root, array));
+    return item_of_type(gltf, gltf_member(item, key), JSON_ARRAY);
 }
 
-GltfItem gltf_extension(const GltfItem *item, const char *name)
+GltfItem gltf_string(Gltf *gltf, const GltfItem *item, const char *key)
 {
-    const GltfItem extensions = gltf_member(item, "extensions");
-    return gltf_member(&extensions, name);
+    return item_of_type(gltf, gltf_member(item, key), JSON_STRING);
+}
+
+GltfItem gltf_element(Gltf *gltf, const GltfItem *array, size_t index)
+{
+    return item_of_type(gltf, gltf_any_element(array, index), JSON_OBJECT);
+}
+
+GltfItem gltf_root(const Gltf *gltf)
+{
+    return (GltfItem){.json = gltf->root};
+}
+
+static GltfItem gltf_root_array(Gltf *gltf, const char *key)
+{
+    const GltfItem root = gltf_root(gltf);
+    return gltf_array(gltf, &root, key);
+}
+
+GltfItem gltf_entry(Gltf *gltf, const char *array, size_t index)
+{
+    const GltfItem entries = gltf_root_array(gltf, array);
+    return gltf_element(gltf, &entries, index);
+}
+
+size_t gltf_count(Gltf *gltf, const char *array)
+{
+    return json_array_size(gltf_root_array(gltf, array).json);
+}
+
+GltfItem gltf_extension(Gltf *gltf, const GltfItem *item, const char *name)
+{
+    const GltfItem extensions = gltf_object(gltf, item, "extensions");
+    return gltf_object(gltf, &extensions, name);
 }
 
 static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t high, size_t *value)
@@ -101,7 +144,8 @@ static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t hi
 static bool index_read(Gltf *gltf, const GltfItem *item, const char *array, size_t *index)
 {
     const size_t count = gltf_count(gltf, array);
-    if (count == 0) return gltf_fails(gltf, item, "the file has no '%s'", array);
+    if (count == 0)
+        return !gltf->has_failed && gltf_fails(gltf, item, "refers to '%s', which the file lacks", array);
     return integer_read(gltf, item, 0, count - 1, index);
 }
 
@@ -119,7 +163,7 @@ bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *a
 
 bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index)
 {
-    const GltfItem item = gltf_element(list, element);
+    const GltfItem item = gltf_any_element(list, element);
     return index_read(gltf, &item, array, index);
 }
 
@@ -135,8 +179,10 @@ bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t coun
     bool is_sound = count == 1 || json_array_size(member.json) == count;
     for (size_t i = 0; i < count && is_sound; i++)
         is_sound = json_number_is_sound(count == 1 ? member.json : json_array_get(member.json, i));
-    if (!is_sound && count == 1) return gltf_fails(gltf, &member, "must be a number up to %g", NUMBER_MAX);
-    if (!is_sound) return gltf_fails(gltf, &member, "must be %zu numbers up to %g", count, NUMBER_MAX);
+    if (!is_sound && count == 1)
+        return gltf_fails(gltf, &member, "must be a number of at most %g in magnitude", NUMBER_MAX);
+    if (!is_sound)
+        return gltf_fails(gltf, &member, "must be %zu numbers of at most %g in magnitude", count, NUMBER_MAX);
     for (size_t i = 0; i < count; i++)
         values[i] = json_number_value(count == 1 ? member.json : json_array_get(member.json, i));
     return true;
@@ -164,44 +210,44 @@ static Text extensions_unread(const json_t *list)
 
 static bool extensions_check(Gltf *gltf)
 {
-    const GltfItem required = gltf_root_member(gltf, "extensionsRequired"),
-                   used = gltf_root_member(gltf, "extensionsUsed");
-    Text names = extensions_unread(required.json);
-    const bool all_read = names.count == 0;
-    if (!all_read)
-        gltf_fails(gltf, &required,
-                   "the file needs %s, which glint does not read; export the file without it",
-                   text_c(&names));
-    text_free(&names);
-    names = extensions_unread(used.json);
-    if (all_read && names.count > 0)
-        gltf_warn(gltf, &used, "not read, and what they add is not shown: %s", text_c(&names));
-    text_free(&names);
-    return all_read;
+    const GltfItem required = gltf_root_array(gltf, "extensionsRequired");
+    OwnedText needed_names = extensions_unread(required.json);
+    if (needed_names.count > 0)
+        return gltf_fails(gltf, &required, "has %s, which glint does not support; export the file without it",
+                          text_c(&needed_names));
+    gltf->is_optional = true;
+    const GltfItem used = gltf_root_array(gltf, "extensionsUsed");
+    gltf->is_optional = false;
+    OwnedText used_names = extensions_unread(used.json);
+    if (used_names.count > 0)
+        gltf_warn(gltf, &used, "has %s, which glint does not support; what they add is missing",
+                  text_c(&used_names));
+    return true;
 }
 
 static bool asset_check(Gltf *gltf)
 {
-    const GltfItem asset = gltf_root_member(gltf, "asset");
+    const GltfItem root = gltf_root(gltf), asset = gltf_object(gltf, &root, "asset");
     const GltfItem needed =
         gltf_member(&asset, json_object_get(asset.json, "minVersion") ? "minVersion" : "version");
     const char *version = json_string_value(needed.json);
     if (!version) return gltf_fails(gltf, &needed, "is missing; glint reads glTF 2.0");
     return strcmp(version, "2.0") == 0 ||
            (strncmp(version, "2.", 2) == 0 && strcmp(needed.path, "asset.version") == 0) ||
-           gltf_fails(gltf, &needed, "'%.20s' is not read; glint reads glTF 2.0", version);
+           gltf_fails(gltf, &needed, "is '%.20s'; glint reads glTF 2.0", version);
 }
 
 static bool json_read(Gltf *gltf, const char *text, size_t length, size_t offset)
 {
     json_error_t error;
     if (length > JSON_BYTES_MAX)
-        return draft_refuse(gltf->draft, "a JSON text of %zu bytes; %d is the most", length, JSON_BYTES_MAX);
+        return draft_refuse(gltf->draft, "the JSON text has %zu bytes; at most %d are supported", length,
+                            JSON_BYTES_MAX);
     gltf->root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
     // the position is past the faulty word
     const size_t position = error.position > 0 ? (size_t)error.position - 1 : 0;
     if (!gltf->root) return draft_fails(gltf->draft, offset + position, "%s", error.text);
-    return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "not a JSON object");
+    return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "the JSON text must be an object");
 }
 
 // Reads a GLB file, which has a header of 12 bytes and then chunks of a length, a type and bytes. The first
@@ -211,9 +257,10 @@ static bool glb_read(Gltf *gltf, const Source *source)
     enum { HEADER_BYTES = 12, CHUNK_BYTES = 8, CHUNK_JSON = 0x4E4F534A, CHUNK_BINARY = 0x004E4942 };
     MeshDraft *draft = gltf->draft;
     draft->places = DRAFT_BYTES;
-    if (source->length < HEADER_BYTES + CHUNK_BYTES) return draft_refuse(draft, "too short for a GLB file");
+    if (source->length < HEADER_BYTES + CHUNK_BYTES)
+        return draft_refuse(draft, "the file is too short to be a GLB file");
     const uint32_t version = little_endian_at(source->bytes + 4);
-    if (version != 2) return draft_fails(draft, 4, "GLB version %u is not read; glint reads 2", version);
+    if (version != 2) return draft_fails(draft, 4, "the GLB version is %u; glint reads version 2", version);
     size_t at = HEADER_BYTES;
     for (int i = 0; i < 2 && source->length - at >= CHUNK_BYTES; i++) {
         const size_t length = little_endian_at(source->bytes + at);
@@ -231,14 +278,15 @@ static bool glb_read(Gltf *gltf, const Source *source)
 
 static void gltf_open(Gltf *gltf)
 {
-    const size_t material_count = gltf_count(gltf, "materials") + 1;
     gltf->buffer_count = gltf_count(gltf, "buffers");
     gltf->buffers = memory_allocate_zeroed(gltf->buffer_count, sizeof *gltf->buffers);
-    gltf->materials = memory_allocate_zeroed(material_count, sizeof *gltf->materials);
+    gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes"), sizeof *gltf->is_visited);
+    gltf->is_optional = true;
+    gltf->materials = memory_allocate_zeroed(gltf_count(gltf, "materials") + 1, sizeof *gltf->materials);
     const size_t image_count = gltf_count(gltf, "images");
     gltf->images = memory_allocate(2 * image_count, sizeof *gltf->images);
     memset(gltf->images, 0xff, 2 * image_count * sizeof *gltf->images);
-    gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes"), sizeof *gltf->is_visited);
+    gltf->is_optional = false;
 }
 
 static void gltf_close(Gltf *gltf)
@@ -262,12 +310,9 @@ bool gltf_read(MeshDraft *draft)
                           : json_read(&gltf, source->bytes + mark, source->length - mark, mark);
     if (read) {
         gltf_open(&gltf);
-        const GltfItem animations = gltf_root_member(&gltf, "animations");
-        if (animations.json)
-            gltf_warn_once(&gltf, &animations,
-                           "animations are not played: nodes keep their pose in the file");
-        read = asset_check(&gltf) && extensions_check(&gltf) && gltf_structure_check(&gltf) &&
-               gltf_scene_read(&gltf);
+        const GltfItem root = gltf_root(&gltf), animations = gltf_member(&root, "animations");
+        if (animations.json) gltf_warn_once(&gltf, &animations, draft_animations);
+        read = asset_check(&gltf) && extensions_check(&gltf) && gltf_scene_read(&gltf) && !gltf.has_failed;
     }
     draft->places = DRAFT_NO_PLACES;
     gltf_close(&gltf);

@@ -33,6 +33,7 @@ typedef struct {
 // A material of the file. Only primitives that have its set of texture coordinates show its texture.
 typedef struct {
     Material look;
+    const char *name; // NULL for none
     bool is_read;
     GltfTexture texture, normals;
     double textured_ambient; // the ambient factor with the texture
@@ -51,24 +52,32 @@ typedef struct {
     uint32_t *images; // the textures of each image as colors and as normals, DRAFT_NONE before they are read
     bool *is_visited; // by node
     bool is_optional; // whether errors in what is being read are warnings
+    bool has_failed;  // whether an error was reported
 } Gltf;
 
-// Reports an error at the item, or a warning while `is_optional` is set. Always returns false.
+// Reports that the item must be or lacks something, which the message's verb begins. The report is an error,
+// or a warning while `is_optional` is set. Always returns false.
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Warns about a feature that glint does not show. Only the first place with the same text is named.
+// Warns by a sentence about a feature that glint does not show. Only the first place with the same text is
+// named.
 void gltf_warn_once(Gltf *gltf, const GltfItem *item, const char *text);
 
-// Returns a member of an object or an element of an array.
+GltfItem gltf_root(const Gltf *gltf);
+// Returns a member of any type of an object.
 GltfItem gltf_member(const GltfItem *item, const char *key);
-GltfItem gltf_element(const GltfItem *item, size_t index);
-// Returns an element of one of the file's arrays, such as "nodes".
-GltfItem gltf_entry(const Gltf *gltf, const char *array, size_t index);
-size_t gltf_count(const Gltf *gltf, const char *array);
-// Returns an extension of the item.
-GltfItem gltf_extension(const GltfItem *item, const char *name);
+// Return a member that must be an object, an array or a string, an object in an array, an extension of the
+// item, and an object in one of the file's arrays, such as "nodes". Each of these reports a value of another
+// type by gltf_fails and returns it as missing.
+GltfItem gltf_object(Gltf *gltf, const GltfItem *item, const char *key);
+GltfItem gltf_array(Gltf *gltf, const GltfItem *item, const char *key);
+GltfItem gltf_string(Gltf *gltf, const GltfItem *item, const char *key);
+GltfItem gltf_element(Gltf *gltf, const GltfItem *array, size_t index);
+GltfItem gltf_extension(Gltf *gltf, const GltfItem *item, const char *name);
+GltfItem gltf_entry(Gltf *gltf, const char *array, size_t index);
+size_t gltf_count(Gltf *gltf, const char *array);
 
 // Each of these reads a member and leaves the value unchanged if it is missing. Returns false with an error
 // if the member has another type or is out of range.
@@ -79,12 +88,6 @@ bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *a
 bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index);
 // Reads one number if `count` is 1, else an array of `count` numbers. Magnitudes are at most NUMBER_MAX.
 bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t count, double *values);
-
-// gltf_structure.c
-
-// Checks that the members that glint reads have the JSON types of the format. Warns about an optional member
-// of another type, which then reads as missing. Returns false with an error about a required one.
-bool gltf_structure_check(Gltf *gltf);
 
 // gltf_accessor.c
 

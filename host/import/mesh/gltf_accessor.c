@@ -57,59 +57,55 @@ char *gltf_path(Gltf *gltf, const GltfItem *uri)
     const size_t scheme = strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
     // a scheme of one letter is a drive
     if (text[0] == '\0' || (scheme != 1 && text[scheme] == ':')) return NULL;
-    Text name = {0};
+    OwnedText name = {0};
     percent_decode(&name, text);
     bool is_moved = false;
     // a NUL would end the name early
     char *path = strlen(name.items) == name.count
                      ? draft_find_file(gltf->draft->import->path, name.items, name.count, &is_moved)
                      : NULL;
-    if (is_moved) gltf_warn(gltf, uri, "no '%.100s': '%.100s' is used", name.items, path);
-    text_free(&name);
+    if (is_moved)
+        gltf_warn(gltf, uri, "names '%.100s', which does not exist; '%.100s' is used", name.items, path);
     return path;
 }
 
 // Reads the buffer's file, or shares the bytes of another buffer with the same file.
 static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri)
 {
-    char *path = gltf_path(gltf, uri);
+    OWNED char *path = gltf_path(gltf, uri);
     if (!path) return gltf_fails(gltf, uri, "must be a relative path or base64 data");
     scene_file_named(gltf->draft->import->options, path);
     const char *obstacle = file_obstacle(path);
-    MessageList problems = {0};
-    bool read = !obstacle;
-    if (read) {
-        const FileId file = file_id(path);
-        for (size_t i = 0; i < gltf->buffer_count; i++)
-            if (gltf->buffers[i].bytes && file_is_same(gltf->buffers[i].file, file))
-                *buffer = (GltfBuffer){.bytes = gltf->buffers[i].bytes, .length = gltf->buffers[i].length};
-        read = buffer->bytes || text_read_file(&buffer->owned, path, &problems);
-        buffer->file = file;
-    }
-    if (obstacle) gltf_fails(gltf, uri, "cannot read '%.100s': %s", path, obstacle);
-    if (problems.count > 0) gltf_fails(gltf, uri, "%s", problems.items[0].text);
-    message_list_free(&problems);
-    free(path);
-    return read;
+    if (obstacle) return gltf_fails(gltf, uri, "names '%.100s', which cannot be read: %s", path, obstacle);
+    const FileId file = file_id(path);
+    for (size_t i = 0; i < gltf->buffer_count; i++)
+        if (gltf->buffers[i].bytes && file_is_same(gltf->buffers[i].file, file))
+            *buffer = (GltfBuffer){.bytes = gltf->buffers[i].bytes, .length = gltf->buffers[i].length};
+    buffer->file = file;
+    OwnedMessageList problems = {0};
+    return buffer->bytes || text_read_file(&buffer->owned, path, &problems) ||
+           gltf_fails(gltf, uri, "names an unreadable file; %s", problems.items[0].text);
 }
 
 static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bool is_first)
 {
-    const GltfItem uri = gltf_member(item, "uri");
+    const GltfItem uri = gltf_string(gltf, item, "uri");
     const char *text = json_string_value(uri.json);
     size_t length = 0;
     if (!gltf_integer(gltf, item, "byteLength", 1, size_max, &length)) return false;
     if (!uri.json && is_first && gltf->binary.bytes)
         *buffer = gltf->binary;
     else if (!text)
-        return gltf_fails(gltf, &uri, "is missing: the file lacks the buffer's bytes");
+        return !gltf->has_failed &&
+               gltf_fails(gltf, &uri, "is missing, so the file lacks the buffer's bytes");
     else if (strncmp(text, "data:", 5) == 0 && !gltf_data_decode(&buffer->owned, text))
         return gltf_fails(gltf, &uri, "is not base64");
     else if (strncmp(text, "data:", 5) != 0 && !buffer_read_file(gltf, buffer, &uri))
         return false;
     if (!buffer->bytes) buffer->length = buffer->owned.count;
     if (length > buffer->length)
-        return gltf_fails(gltf, item, "has %zu bytes; byteLength is %zu", buffer->length, length);
+        return gltf_fails(gltf, item, "has only %zu bytes, but its byteLength is %zu", buffer->length,
+                          length);
     if (!buffer->bytes || buffer->bytes == gltf->binary.bytes) gltf->byte_count += buffer->length;
     if (!buffer->bytes) buffer->bytes = text_c(&buffer->owned);
     return true;
@@ -145,7 +141,7 @@ bool gltf_view_read(Gltf *gltf, const GltfItem *item, const char *key, Source *b
     const GltfBuffer *buffer = buffer_open(gltf, buffer_index);
     if (!buffer) return false;
     if (offset + length > buffer->length)
-        return gltf_fails(gltf, &view, "ends at byte %zu of a buffer of %zu", offset + length,
+        return gltf_fails(gltf, &view, "ends at byte %zu of a buffer of %zu bytes", offset + length,
                           buffer->length);
     *bytes = (Source){.bytes = buffer->bytes + offset, .length = length};
     return true;
@@ -210,7 +206,7 @@ static bool elements_find(Gltf *gltf, const GltfItem *item, Elements *elements)
     if (!gltf_view_read(gltf, item, "bufferView", &view, &elements->stride)) return false;
     const uint64_t end = elements->offset + (uint64_t)(elements->count - 1) * elements->stride + size;
     if (end > view.length)
-        return gltf_fails(gltf, item, "ends at byte %ju of a buffer view of %zu", (uintmax_t)end,
+        return gltf_fails(gltf, item, "ends at byte %ju of a buffer view of %zu bytes", (uintmax_t)end,
                           view.length);
     elements->bytes = view.bytes + elements->offset;
     return true;
@@ -227,9 +223,10 @@ static void element_read(const Elements *elements, size_t row, double *values)
 // Replaces the elements that a sparse accessor names.
 static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *elements, GltfNumbers *numbers)
 {
-    const GltfItem sparse = gltf_member(accessor, "sparse");
+    const GltfItem sparse = gltf_object(gltf, accessor, "sparse");
     if (!sparse.json) return true;
-    const GltfItem indices = gltf_member(&sparse, "indices"), values = gltf_member(&sparse, "values");
+    const GltfItem indices = gltf_object(gltf, &sparse, "indices"),
+                   values = gltf_object(gltf, &sparse, "values");
     Elements of_indices = {.width = 1}, of_values = *elements;
     of_values.offset = 0;
     if (!gltf_integer(gltf, &sparse, "count", 1, elements->count, &of_indices.count) ||
@@ -239,7 +236,7 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
         return false;
     of_values.count = of_indices.count;
     if (of_indices.count == 0 || component_size(of_indices.type) == 0 ||
-        !json_object_get(indices.json, "bufferView") || !json_object_get(values.json, "bufferView"))
+        !gltf_member(&indices, "bufferView").json || !gltf_member(&values, "bufferView").json)
         return gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
     if (!elements_find(gltf, &indices, &of_indices) || !elements_find(gltf, &values, &of_values))
         return false;
@@ -247,8 +244,9 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
         double row = 0;
         element_read(&of_indices, i, &row);
         if (!(row >= 0 && row < (double)elements->count))
-            return gltf_fails(gltf, &indices, "element %zu names %.0f; there are %zu", i, row,
-                              elements->count);
+            return gltf_fails(gltf, &indices,
+                              "names element %.0f (counted from 0) in row %zu, but the accessor has only %zu",
+                              row, i, elements->count);
         element_read(&of_values, i, numbers->items + (size_t)row * numbers->width);
     }
     return true;
@@ -257,10 +255,11 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
 static bool elements_read(Gltf *gltf, const GltfItem *accessor, size_t width, Elements *elements)
 {
     static const char *const types[] = {NULL, "SCALAR", "VEC2", "VEC3"};
-    const GltfItem type = gltf_member(accessor, "type");
+    const GltfItem type = gltf_member(accessor, "type"), normalized = gltf_member(accessor, "normalized");
     const char *name = json_string_value(type.json);
-    *elements = (Elements){.width = width,
-                           .is_normalized = json_is_true(json_object_get(accessor->json, "normalized"))};
+    *elements = (Elements){.width = width, .is_normalized = json_is_true(normalized.json)};
+    if (normalized.json && !json_is_boolean(normalized.json))
+        return gltf_fails(gltf, &normalized, "must be true or false");
     if (!name || strcmp(name, types[width]) != 0)
         return gltf_fails(gltf, &type, "must be '%s' here", types[width]);
     if (!gltf_integer(gltf, accessor, "componentType", GLTF_INT8, GLTF_FLOAT, &elements->type) ||
@@ -268,7 +267,7 @@ static bool elements_read(Gltf *gltf, const GltfItem *accessor, size_t width, El
         !gltf_integer(gltf, accessor, "count", 1, DRAFT_NONE - 1, &elements->count))
         return false;
     return (elements->count > 0 && component_size(elements->type) > 0) ||
-           gltf_fails(gltf, accessor, "lacks 'count' or a 'componentType' that glTF has");
+           gltf_fails(gltf, accessor, "lacks 'count' or a valid 'componentType'");
 }
 
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width, GltfNumbers *numbers)
@@ -280,12 +279,11 @@ bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_
     if (index == SIZE_MAX) return true;
     const GltfItem accessor = gltf_entry(gltf, "accessors", index);
     if (!elements_read(gltf, &accessor, width, &elements)) return false;
-    if (json_object_get(accessor.json, "bufferView") && !elements_find(gltf, &accessor, &elements))
-        return false;
+    if (gltf_member(&accessor, "bufferView").json && !elements_find(gltf, &accessor, &elements)) return false;
     gltf->element_count += elements.count;
     if (gltf->element_count > gltf->byte_count + ELEMENTS_MAX)
         return gltf_fails(gltf, &accessor,
-                          "the accessors in use have %zu elements in total; at most %zu are read",
+                          "brings the accessors to %zu elements in total; at most %zu are supported",
                           gltf->element_count, gltf->byte_count + ELEMENTS_MAX);
     numbers->count = elements.count;
     numbers->items = memory_allocate_zeroed(elements.count, width * sizeof *numbers->items);

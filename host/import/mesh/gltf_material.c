@@ -30,7 +30,7 @@ static void factors_read(Gltf *gltf, const GltfItem *item, const char *key, size
     for (size_t i = 0; i < count; i++) {
         if (range_holds(range, read[i])) continue;
         const GltfItem member = gltf_member(item, key);
-        gltf_warn(gltf, &member, "must be %s, not %g: the default is used", range->must, read[i]);
+        gltf_warn(gltf, &member, "must be %s, not %g; the default is used", range->must, read[i]);
         return;
     }
     memcpy(values, read, count * sizeof *read);
@@ -46,14 +46,14 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
                              .cutoff = 0.5,
                              .attenuation = {1, 1, 1},
                              .attenuation_distance = DBL_MAX};
-    const GltfItem pbr = gltf_member(item, "pbrMetallicRoughness"),
-                   strength = gltf_extension(item, "KHR_materials_emissive_strength"),
-                   glass = gltf_extension(item, "KHR_materials_transmission"),
-                   ior = gltf_extension(item, "KHR_materials_ior"),
-                   volume = gltf_extension(item, "KHR_materials_volume");
-    surface->is_unlit = gltf_extension(item, "KHR_materials_unlit").json != NULL;
-    surface->base_texture = gltf_member(&pbr, "baseColorTexture");
-    surface->emissive_texture = gltf_member(item, "emissiveTexture");
+    const GltfItem pbr = gltf_object(gltf, item, "pbrMetallicRoughness"),
+                   strength = gltf_extension(gltf, item, "KHR_materials_emissive_strength"),
+                   glass = gltf_extension(gltf, item, "KHR_materials_transmission"),
+                   ior = gltf_extension(gltf, item, "KHR_materials_ior"),
+                   volume = gltf_extension(gltf, item, "KHR_materials_volume");
+    surface->is_unlit = gltf_extension(gltf, item, "KHR_materials_unlit").json != NULL;
+    surface->base_texture = gltf_object(gltf, &pbr, "baseColorTexture");
+    surface->emissive_texture = gltf_object(gltf, item, "emissiveTexture");
     factors_read(gltf, &pbr, "baseColorFactor", 4, &range_factor, surface->base);
     factors_read(gltf, &pbr, "metallicFactor", 1, &range_factor, &surface->metal);
     factors_read(gltf, &pbr, "roughnessFactor", 1, &range_factor, &surface->roughness);
@@ -70,8 +70,8 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
         const char *key;
         const char *text;
     } losses[] = {
-        {&pbr, "metallicRoughnessTexture", "the texture of metal and roughness is not used: the factors are"},
-        {item, "occlusionTexture", "occlusion textures are not used: the lights' shadows are"}};
+        {&pbr, "metallicRoughnessTexture", "metallic-roughness textures are ignored; the factors are used"},
+        {item, "occlusionTexture", "occlusion textures are ignored; shadows come from the lights"}};
     for (size_t i = 0; i < COUNT_OF(losses); i++) {
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
         if (lost.json) gltf_warn_once(gltf, &lost, losses[i].text);
@@ -82,29 +82,25 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
 static uint32_t image_add(Gltf *gltf, const GltfItem *image, TextureContent content)
 {
     MeshDraft *draft = gltf->draft;
-    const GltfItem uri = gltf_member(image, "uri");
+    const GltfItem uri = gltf_string(gltf, image, "uri");
     const char *text = json_string_value(uri.json);
     if (text && strncmp(text, "data:", 5) != 0) {
-        char *path = gltf_path(gltf, &uri);
+        OWNED char *path = gltf_path(gltf, &uri);
         if (!path)
-            gltf_warn(gltf, &uri, "must be a relative path or base64 data: %s", texture_fallback(content));
-        const uint32_t texture = path ? draft_add_texture(draft, path, content, image->path) : 0;
-        free(path);
-        return texture;
+            gltf_warn(gltf, &uri, "must be a relative path or base64 data; %s", texture_fallback(content));
+        return path ? draft_add_texture(draft, path, content, image->path) : 0;
     }
-    if (!text && !json_object_get(image->json, "bufferView")) {
-        gltf_warn(gltf, image, "has no 'uri' or 'bufferView': %s", texture_fallback(content));
+    if (!text && !gltf_member(image, "bufferView").json) {
+        gltf_warn(gltf, image, "has no 'uri' or 'bufferView'; %s", texture_fallback(content));
         return 0;
     }
     Source bytes = {.bytes = ""};
-    Text decoded = {0};
+    OwnedText decoded = {0};
     size_t stride;
     if (!text) gltf_view_read(gltf, image, "bufferView", &bytes, &stride);
     if (text && gltf_data_decode(&decoded, text))
         bytes = (Source){.bytes = text_c(&decoded), .length = decoded.count};
-    const uint32_t texture = draft_add_embedded_texture(draft, &bytes, content, image->path);
-    text_free(&decoded);
-    return texture;
+    return draft_add_embedded_texture(draft, &bytes, content, image->path);
 }
 
 static bool wrap_read(Gltf *gltf, const GltfItem *sampler, const char *key, TextureWrap *wrap)
@@ -127,7 +123,8 @@ static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place
     wrap_read(gltf, &sampler, "wrapS", &place->wraps[0]);
     wrap_read(gltf, &sampler, "wrapT", &place->wraps[1]);
     if (json_integer_value(filter.json) == NEAREST)
-        gltf_warn_once(gltf, &filter, "filtering by the nearest texel is not used: texels are interpolated");
+        gltf_warn_once(gltf, &filter,
+                       "filtering by the nearest texel is not supported; texels are interpolated");
 }
 
 // Reads KHR_texture_transform, which scales, rotates counterclockwise as the image is seen, with v downward,
@@ -135,7 +132,7 @@ static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place
 // unlike its text, its sample model and other programs.
 static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *place)
 {
-    const GltfItem transform = gltf_extension(info, "KHR_texture_transform");
+    const GltfItem transform = gltf_extension(gltf, info, "KHR_texture_transform");
     double offset[2] = {0, 0}, scale[2] = {1, 1}, angle = 0;
     if (!gltf_numbers(gltf, &transform, "offset", 2, offset) ||
         !gltf_numbers(gltf, &transform, "scale", 2, scale) ||
@@ -156,7 +153,7 @@ static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent conten
     const GltfItem texture = gltf_entry(gltf, "textures", index);
     if (!gltf_index(gltf, &texture, "source", "images", &source)) return;
     if (source == SIZE_MAX) {
-        gltf_warn(gltf, &texture, "has no PNG or JPEG image: %s", texture_fallback(content));
+        gltf_warn(gltf, &texture, "has no PNG or JPEG image; %s", texture_fallback(content));
         return;
     }
     if (!gltf_integer(gltf, info, "texCoord", 0, UV_SETS_MAX, &place->uv_set)) return;
@@ -200,7 +197,7 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surfa
         gltf_warn_once(gltf, item, "reflections of metals do not have the colors of a texture");
 }
 
-static const char unlit_tint[] = "the factors of an emitted texture become their mean";
+static const char unlit_tint[] = "an emitted texture is multiplied by the mean of its factors";
 
 // Makes a texture emit light by reflecting an ambient light of 1, which no other material of the scene
 // reflects. Returns false with a warning for a mesh of another scene, which has an ambient light.
@@ -211,10 +208,9 @@ static bool texture_can_emit(Gltf *gltf, const GltfItem *item, GltfMaterial *mat
         gltf->draft->scene->ambient = vector_all(1);
         material->textured_ambient = ambient;
     } else {
-        gltf_warn_once(
-            gltf, item,
-            "only glint render FILE shows emission by a texture and unlit textures: lit by the lights "
-            "instead");
+        gltf_warn_once(gltf, item,
+                       "textures emit light or are unlit only if the file is rendered as a scene; here "
+                       "lights light them");
     }
     return material->texture_emits;
 }
@@ -259,13 +255,13 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
                              GltfMaterial *material)
 {
     Material *look = &material->look;
-    const GltfItem mode = gltf_member(item, "alphaMode");
+    const GltfItem mode = gltf_string(gltf, item, "alphaMode");
     const char *name = json_string_value(mode.json);
     const bool is_mask = name && strcmp(name, "MASK") == 0, is_blend = name && strcmp(name, "BLEND") == 0;
     const double transmission = clamped(surface->transmission) * (1 - clamped(surface->metal)),
                  alpha = clamped(surface->base[3]);
     if (name && !is_mask && !is_blend && strcmp(name, "OPAQUE") != 0)
-        gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND: OPAQUE is used");
+        gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND; OPAQUE is used");
     const double opacity = is_mask ? alpha >= surface->cutoff : is_blend ? alpha : 1;
     if (surface->base_texture.json && opacity > 0) {
         if (is_mask && surface->cutoff > 0) look->cutout.threshold = surface->cutoff / alpha;
@@ -312,7 +308,7 @@ static void rows_multiply(double (*after)[3], double (*first)[3], double (*produ
 static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
 {
     double upward[2][3] = {{1, 0, 0}, {0, -1, 1}};
-    const GltfItem info = gltf_member(item, "normalTexture");
+    const GltfItem info = gltf_object(gltf, item, "normalTexture");
     GltfTexture *normals = &material->normals, *color = &material->texture;
     Material *look = &material->look;
     texture_read(gltf, &info, TEXTURE_NORMALS, normals);
@@ -325,7 +321,7 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
     const double area = c[0][0] * c[1][1] - c[0][1] * c[1][0];
     if (normals->uv_set != color->uv_set || area == 0) {
         gltf_warn_once(gltf, &info,
-                       "the normal texture has other coordinates than the color: it is not used");
+                       "the normal texture is ignored, because its coordinates differ from the color's");
         normals->number = 0;
         return;
     }
@@ -344,6 +340,7 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
     gltf->is_optional = true;
     surface_read(gltf, item, &surface);
     *material = (GltfMaterial){.look = material_default(),
+                               .name = json_string_value(gltf_member(item, "name").json),
                                .is_read = true,
                                .texture = {.uv_rows = {{1, 0, 0}, {0, 1, 0}}},
                                .normals = {.uv_rows = {{1, 0, 0}, {0, 1, 0}}},
@@ -393,7 +390,5 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
         memcpy(look.image.wraps, material->texture.wraps, sizeof look.image.wraps);
         look.diffuse = vector_multiply(look.diffuse, look.color);
     }
-    const GltfItem item = gltf_entry(gltf, "materials", (size_t)(material - gltf->materials));
-    const char *name = json_string_value(json_object_get(item.json, "name"));
-    return *index = scene_add_material(gltf->draft->scene, &look, name ? name : "");
+    return *index = scene_add_material(gltf->draft->scene, &look, material->name ? material->name : "");
 }

@@ -18,14 +18,14 @@ static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
     if (!gltf_numbers(gltf, node, "matrix", 16, m) || !gltf_numbers(gltf, node, "translation", 3, move) ||
         !gltf_numbers(gltf, node, "rotation", 4, q) || !gltf_numbers(gltf, node, "scale", 3, scale))
         return false;
-    if (json_object_get(node->json, "matrix")) {
+    if (gltf_member(node, "matrix").json) {
         *affine =
             (Affine){{{m[0], m[4], m[8], m[12]}, {m[1], m[5], m[9], m[13]}, {m[2], m[6], m[10], m[14]}}};
         return true;
     }
     // quaternions in files are unit to the precision of a float
     const double squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(squared > 0)) return gltf_fails(gltf, node, "'rotation' must not be 0");
+    if (!(squared > 0)) return gltf_fails(gltf, node, "must have a 'rotation' that is not zero");
     const double s = 2 / squared, x = q[0], y = q[1], z = q[2], w = q[3];
     const double turn[3][3] = {{1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)},
                                {s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)},
@@ -75,7 +75,7 @@ static void attribute_read(Gltf *gltf, const GltfItem *attributes, const char *k
 static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMaterial *material,
                           Vertices *vertices)
 {
-    const GltfItem attributes = gltf_member(primitive, "attributes");
+    const GltfItem attributes = gltf_object(gltf, primitive, "attributes");
     *vertices = (Vertices){.first = gltf->draft->positions.count};
     if (!gltf_accessor_read(gltf, &attributes, "POSITION", 3, &vertices->positions) ||
         !gltf_accessor_read(gltf, primitive, "indices", 1, &vertices->indices))
@@ -87,11 +87,12 @@ static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMater
     for (size_t i = 0; i < vertices->indices.count; i++) {
         const double index = vertices->indices.items[i];
         if (!(index >= 0 && index < (double)vertices->positions.count && index == floor(index)))
-            return gltf_fails(gltf, primitive, "index %zu names vertex %g (from 0); there are %zu", i, index,
+            return gltf_fails(gltf, primitive,
+                              "names vertex %g (counted from 0) in index %zu, but has only %zu", index, i,
                               vertices->positions.count);
     }
-    return vertices->first + vertices->positions.count < DRAFT_NONE ||
-           gltf_fails(gltf, primitive, "too many vertices");
+    return vertices->first + vertices->positions.count <= DRAFT_VERTICES_MAX ||
+           draft_refuse_vertices(gltf->draft);
 }
 
 // Adds the vertices, transformed to the world. v points downward in glTF and upward in glint.
@@ -149,17 +150,16 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     MeshDraft *draft = gltf->draft;
     size_t mode = MODE_TRIANGLES;
     if (!gltf_integer(gltf, primitive, "mode", 0, MODE_FAN, &mode)) return false;
-    const GltfItem attributes = gltf_member(primitive, "attributes"),
+    const GltfItem attributes = gltf_object(gltf, primitive, "attributes"),
                    colors = gltf_member(&attributes, "COLOR_0"), targets = gltf_member(primitive, "targets");
-    if (mode < MODE_TRIANGLES || !json_object_get(attributes.json, "POSITION")) {
+    if (mode < MODE_TRIANGLES || !gltf_member(&attributes, "POSITION").json) {
         gltf_warn_once(gltf, primitive,
                        mode < MODE_TRIANGLES ? "points and lines are not shown"
-                                             : "has no 'POSITION' and is not shown");
+                                             : "primitives without 'POSITION' are not shown");
         return true;
     }
-    if (colors.json) gltf_warn_once(gltf, &colors, "vertex colors are not used: the material's color is");
-    if (targets.json)
-        gltf_warn_once(gltf, &targets, "morph targets are not applied: the mesh keeps its own shape");
+    if (colors.json) gltf_warn_once(gltf, &colors, draft_colors);
+    if (targets.json) gltf_warn_once(gltf, &targets, draft_morphs);
     GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
     Vertices vertices;
     const bool read = vertices_read(gltf, primitive, material, &vertices);
@@ -167,8 +167,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
         const bool has_texture = material->texture.number > 0 || material->normals.number > 0,
                    has_uvs = vertices.uvs.count > 0;
         const uint32_t index = gltf_material_index(gltf, material, has_texture && has_uvs);
-        if (has_texture && !has_uvs)
-            gltf_warn_once(gltf, primitive, "the mesh lacks the texture's coordinates: it is not used");
+        if (has_texture && !has_uvs) gltf_warn_once(gltf, primitive, draft_no_uvs);
         array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
     }
     if (read) {
@@ -180,18 +179,17 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     return read;
 }
 
-// Sets the camera, which looks along the node's -z axis. +y is up.
+// Sets the camera, which is optional and looks along the node's -z axis. +y is up.
 static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
 {
     MeshView *view = gltf->draft->import->view;
-    const GltfItem perspective = gltf_member(camera, "perspective"),
-                   flat = gltf_member(camera, "orthographic");
     double angle = 0, aspect = 0, half_width = 0, half_height = 0;
     if (view->has_camera) {
-        gltf_warn_once(gltf, camera, "only the first camera is used");
+        gltf_warn_once(gltf, camera, draft_cameras);
         return;
     }
-    gltf->is_optional = true;
+    const GltfItem perspective = gltf_object(gltf, camera, "perspective"),
+                   flat = gltf_object(gltf, camera, "orthographic");
     const bool is_sound = gltf_numbers(gltf, &perspective, "yfov", 1, &angle) &&
                           gltf_numbers(gltf, &perspective, "aspectRatio", 1, &aspect) &&
                           gltf_numbers(gltf, &flat, "xmag", 1, &half_width) &&
@@ -212,7 +210,6 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
         }
         view->has_camera = true;
     }
-    gltf->is_optional = false;
 }
 
 // Returns false with a warning if a member of an optional item has a number below 0.
@@ -225,13 +222,13 @@ static bool not_negative(Gltf *gltf, const GltfItem *item, const char *key, size
     return true;
 }
 
+// Adds a light, which is optional.
 static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
 {
-    const GltfItem type = gltf_member(light, "type"), cone = gltf_member(light, "spot");
+    const GltfItem type = gltf_member(light, "type"), cone = gltf_object(gltf, light, "spot");
     const char *name = json_string_value(type.json);
     double color[3] = {1, 1, 1}, intensity = 1, inner = 0, outer = M_PI / 4;
     const bool is_sun = name && strcmp(name, "directional") == 0, is_spot = name && strcmp(name, "spot") == 0;
-    gltf->is_optional = true;
     if (!is_sun && !is_spot && !(name && strcmp(name, "point") == 0))
         gltf_fails(gltf, &type, "must be directional, point or spot");
     else if (gltf_numbers(gltf, light, "color", 3, color) &&
@@ -255,36 +252,36 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
                              .fading = {0, 0, 1}};
         array_push(gltf->draft->import->view->lights, added);
     }
-    gltf->is_optional = false;
 }
 
 // Adds the node's camera and light, or warns about them if the file is a mesh of another scene.
 static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
 {
-    const GltfItem extension = gltf_extension(node, "KHR_lights_punctual"), root = {.json = gltf->root},
-                   all = gltf_extension(&root, "KHR_lights_punctual"), lights = gltf_member(&all, "lights");
-    size_t camera = SIZE_MAX, light = SIZE_MAX;
     gltf->is_optional = true;
+    const GltfItem extension = gltf_extension(gltf, node, "KHR_lights_punctual"), root = gltf_root(gltf),
+                   all = gltf_extension(gltf, &root, "KHR_lights_punctual"),
+                   lights = gltf_array(gltf, &all, "lights");
+    size_t camera = SIZE_MAX, light = SIZE_MAX;
     gltf_index(gltf, node, "camera", "cameras", &camera);
     const size_t light_count = json_array_size(lights.json);
     if (extension.json && light_count > 0)
         gltf_integer(gltf, &extension, "light", 0, light_count - 1, &light);
     else if (extension.json)
-        gltf_fails(gltf, &extension, "the file has no lights");
-    gltf->is_optional = false;
+        gltf_fails(gltf, &extension, "refers to lights, which the file lacks");
     if ((camera != SIZE_MAX || light != SIZE_MAX) && !gltf->draft->import->view) {
-        gltf_warn_once(gltf, node, "cameras and lights of a mesh are not used: those of the scene are");
-        return;
+        gltf_warn_once(gltf, node, draft_view);
+    } else {
+        const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
+                       light_item = gltf_element(gltf, &lights, light);
+        if (camera_item.json) camera_add(gltf, &camera_item, affine);
+        if (light_item.json) light_add(gltf, &light_item, affine);
     }
-    const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
-                   light_item = gltf_element(&lights, light);
-    if (camera != SIZE_MAX) camera_add(gltf, &camera_item, affine);
-    if (light != SIZE_MAX) light_add(gltf, &light_item, affine);
+    gltf->is_optional = false;
 }
 
 static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned depth)
 {
-    const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_member(&node, "children"),
+    const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_array(gltf, &node, "children"),
                    skin = gltf_member(&node, "skin");
     if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "has two parents in the scene");
     if (depth > DEPTH_MAX) return gltf_fails(gltf, &node, "lies more than %d nodes deep", DEPTH_MAX);
@@ -292,15 +289,14 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     Affine local, affine;
     if (!transform_read(gltf, &node, &local)) return false;
     affine = affine_multiply(parent, &local);
-    if (skin.json)
-        gltf_warn_once(gltf, &skin, "skins are not applied: the mesh keeps its own shape, at its node");
+    if (skin.json) gltf_warn_once(gltf, &skin, draft_skins);
     view_add(gltf, &node, &affine);
     size_t mesh_index = SIZE_MAX;
     if (!gltf_index(gltf, &node, "mesh", "meshes", &mesh_index)) return false;
     const GltfItem mesh = gltf_entry(gltf, "meshes", mesh_index),
-                   primitives = gltf_member(&mesh, "primitives");
+                   primitives = gltf_array(gltf, &mesh, "primitives");
     for (size_t i = 0; i < json_array_size(primitives.json); i++) {
-        const GltfItem primitive = gltf_element(&primitives, i);
+        const GltfItem primitive = gltf_element(gltf, &primitives, i);
         if (!primitive_add(gltf, &primitive, &affine)) return false;
     }
     for (size_t i = 0; i < json_array_size(children.json); i++) {
@@ -316,40 +312,38 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
 static bool roots_add(Gltf *gltf, const Affine *affine)
 {
     const size_t count = gltf_count(gltf, "nodes");
-    bool *is_child = memory_allocate_zeroed(count, sizeof *is_child), read = true;
-    for (size_t i = 0; i < count && read; i++) {
-        const GltfItem node = gltf_entry(gltf, "nodes", i), children = gltf_member(&node, "children");
-        for (size_t k = 0; k < json_array_size(children.json) && read; k++) {
-            size_t child = 0;
-            read = gltf_element_index(gltf, &children, k, "nodes", &child);
+    OWNED bool *is_child = memory_allocate_zeroed(count, sizeof *is_child);
+    for (size_t i = 0; i < count; i++) {
+        const GltfItem node = gltf_entry(gltf, "nodes", i), children = gltf_array(gltf, &node, "children");
+        for (size_t k = 0; k < json_array_size(children.json); k++) {
+            size_t child;
+            if (!gltf_element_index(gltf, &children, k, "nodes", &child)) return false;
             is_child[child] = true;
         }
     }
-    for (size_t i = 0; i < count && read; i++)
-        read = is_child[i] || node_add(gltf, i, affine, 0);
-    free(is_child);
-    return read;
+    for (size_t i = 0; i < count; i++)
+        if (!is_child[i] && !node_add(gltf, i, affine, 0)) return false;
+    return true;
 }
 
 bool gltf_scene_read(Gltf *gltf)
 {
-    const GltfItem root = {.json = gltf->root};
-    MeshDraft *draft = gltf->draft;
+    const GltfItem root = gltf_root(gltf);
+    const size_t count = gltf_count(gltf, "scenes");
     size_t index = 0;
-    bool read = true;
-    if (gltf_count(gltf, "scenes") == 0) {
-        read = roots_add(gltf, &affine_identity);
-    } else if (gltf_index(gltf, &root, "scene", "scenes", &index)) {
-        const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_member(&scene, "nodes");
-        if (gltf_count(gltf, "scenes") > 1) gltf_warn_once(gltf, &scene, "only this scene is shown");
-        for (size_t i = 0; i < json_array_size(nodes.json) && read; i++) {
-            size_t node;
-            read = gltf_element_index(gltf, &nodes, i, "nodes", &node) &&
-                   node_add(gltf, node, &affine_identity, 0);
-        }
+    if (count == 0) {
+        if (!roots_add(gltf, &affine_identity)) return false;
     } else {
-        read = false;
+        if (!gltf_index(gltf, &root, "scene", "scenes", &index)) return false;
+        const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_array(gltf, &scene, "nodes");
+        if (count > 1) gltf_warn_once(gltf, &scene, "only this scene is shown");
+        for (size_t i = 0; i < json_array_size(nodes.json); i++) {
+            size_t node;
+            if (!gltf_element_index(gltf, &nodes, i, "nodes", &node) ||
+                !node_add(gltf, node, &affine_identity, 0))
+                return false;
+        }
     }
-    draft_fill_parts(draft);
-    return read;
+    draft_fill_parts(gltf->draft);
+    return true;
 }

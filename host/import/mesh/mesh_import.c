@@ -32,30 +32,30 @@ bool mesh_is_known(const char *path)
 static bool file_read(MeshDraft *draft, Mesh *mesh)
 {
     bool (*read)(MeshDraft *) = reader_of(draft->import->path);
-    Text text = {0};
-    MessageList problems = {0};
+    OwnedText text = {0};
     const char *obstacle = file_obstacle(draft->import->path);
-    bool done = !obstacle || draft_refuse(draft, "%s", obstacle);
-    if (done && read != assimp_process_read) {
-        done = text_read_file(&text, draft->import->path, &problems);
-        if (!done) report_error(draft->import->report, draft->import->offset, "%s", problems.items[0].text);
-        message_list_free(&problems);
+    if (obstacle) return draft_refuse(draft, "cannot read the file: %s", obstacle);
+    if (read != assimp_process_read) {
+        OwnedMessageList problems = {0};
+        if (!text_read_file(&text, draft->import->path, &problems))
+            return report_error(draft->import->report, draft->import->offset, "%s", problems.items[0].text);
         draft->source.bytes = text_c(&text);
         draft->source.length = text.count;
         stage_begin(draft->stage, "reading", draft->import->path, text.count);
     }
-    done = done && read(draft) && draft_check(draft);
+    if (!read(draft) || !draft_check(draft)) return false;
     text_free(&text);
     stage_begin(draft->stage, "joining the vertices of", draft->import->path, 0);
-    if (done) draft_finish(draft, mesh);
-    return done;
+    draft_finish(draft, mesh);
+    return true;
 }
 
 static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
 {
     const size_t degenerate_count = mesh_degenerate_count(mesh);
     if (degenerate_count > 0)
-        draft_warn(draft, "triangles without area, which are never hit: %zu", degenerate_count);
+        draft_warn(draft, "%zu triangle%s no area and %s never hit", degenerate_count,
+                   degenerate_count == 1 ? " has" : "s have", text_is_are(degenerate_count));
     if (draft->crossed_count > 0)
         draft_warn(draft, "%zu polygon%s far from planar; only parts are filled", draft->crossed_count,
                    draft->crossed_count == 1 ? " intersects itself or is" : "s intersect themselves or are");

@@ -112,11 +112,12 @@ static void lights_add(Scene *scene, const MeshView *view, Bounds bounds, Report
     if (unsound_count > 0)
         report_warning(report, MESSAGE_WHOLE_FILE,
                        "%zu light%s no direction or a value out of range and %s ignored", unsound_count,
-                       unsound_count == 1 ? " has" : "s have", unsound_count == 1 ? "is" : "are");
+                       unsound_count == 1 ? " has" : "s have", text_is_are(unsound_count));
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
         report, MESSAGE_WHOLE_FILE,
-        "lights of %.3g in total around the center, which would show little but white or black: scaled to 1",
+        "the lights' total around the center is %.3g, which would show little but white or black; they are "
+        "scaled to 1",
         sum);
     for (size_t i = 0; i < scene->lights.count; i++)
         scene->lights.items[i].color = vector_scale(scene->lights.items[i].color, 1 / sum);

@@ -35,6 +35,8 @@ typedef struct {
     MtlNumber illumination; // illum
 } MtlMaterial;
 
+static const char unsupported[] = "is not supported and is ignored";
+
 typedef struct {
     MeshDraft *draft;
     ARRAY_OF(MtlMaterial) materials;
@@ -48,6 +50,7 @@ typedef struct {
     bool has_reflection; // whether reflection was warned of
 } MtlReader;
 
+// Returns the material that the file's lines describe, or NULL before the first one.
 static MtlMaterial *material_of(MtlReader *reader)
 {
     return reader->materials.count > reader->first_material
@@ -72,7 +75,8 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
     }
     if (is_glass && !has_dissolve && !has_transparency)
         report_warning(&reader->report, material->illumination.offset,
-                       "illum %g is for glass, but d and Tr are missing: opaque", illumination);
+                       "illum %g is for glass, but d and Tr are missing; the material is opaque",
+                       illumination);
     const size_t last_offset = material->dissolve.offset > material->transparency.offset
                                    ? material->dissolve.offset
                                    : material->transparency.offset;
@@ -123,17 +127,17 @@ static bool factor_read(MtlReader *reader, const Statement *statement, void *tar
     const Range *range = statement->range;
     double number;
     const size_t offset = line_word_offset(&reader->line);
-    if (line_try_number(&reader->line, &number) != NUMBER_READ) {
-        report_warning(&reader->report, offset, "no number up to %g: the default is used", NUMBER_MAX);
-        return false;
-    }
-    if (!range_holds(range, number)) {
-        report_warning(&reader->report, offset, "must be %s, not %g: the default is used", range->must,
-                       number);
-        return false;
-    }
-    *(double *)target = number;
-    return true;
+    const bool is_number = line_try_number(&reader->line, &number) == NUMBER_READ;
+    if (!is_number)
+        report_warning(&reader->report, offset,
+                       "'%s' must be a number of at most %g in magnitude; the default is used",
+                       statement->word, NUMBER_MAX);
+    else if (!range_holds(range, number))
+        report_warning(&reader->report, offset, "'%s' must be %s, not %g; the default is used",
+                       statement->word, range->must, number);
+    else
+        *(double *)target = number;
+    return is_number && range_holds(range, number);
 }
 
 // Reads a factor and its place into an MtlNumber.
@@ -151,7 +155,7 @@ static bool dissolve_read(MtlReader *reader, const Statement *statement, void *t
     const Word word = line_word(&ahead);
     number->offset = word.offset;
     if (word_is(word, "-halo")) {
-        unused_record(&reader->unused, &reader->report, word, "is not used");
+        unused_record(&reader->unused, &reader->report, word, unsupported);
         reader->line = ahead;
     }
     return factor_read(reader, statement, &number->value);
@@ -203,29 +207,24 @@ static bool texture_read(MtlReader *reader, const Statement *statement, void *ta
     const bool has_normals = statement->content == TEXTURE_NORMALS || statement->content == TEXTURE_BUMPS;
     const size_t offset = line_word_offset(&reader->line);
     if (has_normals && image->path)
-        report_warning(&reader->report, offset, "a second map of normals or heights: it replaces the first");
+        report_warning(&reader->report, offset, "a second normal or height map replaces the first");
     free(image->path);
     *image = (MtlImage){.content = statement->content, .strength = 1};
     bool has_options = false, is_used;
     while (texture_option_read(&reader->line, has_normals ? &image->strength : NULL, &is_used))
         has_options |= !is_used;
-    if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
+    if (has_options) report_warning(&reader->report, offset, "the options of textures are ignored");
     const Word name = line_rest(&reader->line);
     bool is_moved;
-    char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
-    if (is_moved)
-        report_warning(&reader->report, name.offset, "no '%.*s': '%s' is used", WORD_TEXT(name), path);
+    OWNED char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
+    if (is_moved) report_warning(&reader->report, name.offset, DRAFT_MOVED_FILE, WORD_TEXT(name), path);
     scene_file_named(reader->draft->import->options, path);
-    const char *obstacle = file_obstacle(path), *fallback = texture_fallback(statement->content);
+    OWNED char *obstacle = texture_obstacle(path, statement->content);
     if (obstacle)
-        report_warning(&reader->report, name.offset, "cannot read '%s': %s: %s", path, obstacle, fallback);
-    else if (!image_is_known(path))
-        report_warning(&reader->report, name.offset, "'%s' is not a PNG, JPEG, PPM or EXR: %s", path,
-                       fallback);
+        report_warning(&reader->report, name.offset, "%s", obstacle);
     else
-        image->path = memory_copy_text(path);
-    free(path);
-    return image->path != NULL;
+        image->path = memory_release(&path);
+    return !obstacle;
 }
 
 static const Range range_illumination = {0, 10, false, "from 0 to 10"};
@@ -265,12 +264,12 @@ static void line_read(MtlReader *reader)
          statement++) {
         if (!word_is(word, statement->word)) continue;
         if (!material)
-            report_warning(&reader->report, word.offset, "a line before the first newmtl is not used");
+            report_warning(&reader->report, word.offset, "a line before the first newmtl is ignored");
         else if (statement->read)
             statement->read(reader, statement, (char *)material + statement->target);
         return;
     }
-    unused_record(&reader->unused, &reader->report, word, "is not used");
+    unused_record(&reader->unused, &reader->report, word, unsupported);
 }
 
 // Orders materials of one name as their files do.
@@ -290,7 +289,7 @@ static void materials_sort(MtlReader *reader)
         const MtlMaterial *material = &reader->materials.items[i];
         if (material->number >= reader->first_material && strcmp(material->name, material[-1].name) == 0)
             report_warning(&reader->report, material->offset,
-                           "material '%.40s' is given twice: the last is used", material->name);
+                           "material '%.40s' is given twice; the last one is used", material->name);
     }
 }
 
@@ -320,41 +319,37 @@ static bool library_read(MtlReader *reader, const char *path)
     for (size_t i = 0; i < reader->files.count; i++)
         if (file_is_same(reader->files.items[i], file)) return true;
     scene_file_named(reader->draft->import->options, path);
-    Text text = {0};
+    OwnedText text = {0};
+    if (file_obstacle(path) || !text_read_file(&text, path, NULL)) return false;
     MessageList messages = {0};
-    const bool is_there = !file_obstacle(path) && text_read_file(&text, path, NULL);
-    if (is_there) {
-        array_push(reader->files, file);
-        const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
-        reader->path = path;
-        reader->report = report_open(&source, &messages);
-        reader->line = line_first_of_mesh(&reader->report);
-        reader->unused.count = 0;
-        reader->has_reflection = false;
-        reader->first_material = reader->materials.count;
-        if (line_is_text(&reader->line)) {
-            do
-                line_read(reader);
-            while (line_next(&reader->line));
-            MtlMaterial *last = material_of(reader);
-            if (last) material_end(reader, last);
-            materials_sort(reader);
-        }
-        report_include(reader->draft->import->report, &reader->report);
+    array_push(reader->files, file);
+    const Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
+    reader->path = path;
+    reader->report = report_open(&source, &messages);
+    reader->line = line_first_of_mesh(&reader->report);
+    reader->unused.count = 0;
+    reader->has_reflection = false;
+    reader->first_material = reader->materials.count;
+    if (line_is_text(&reader->line)) {
+        do
+            line_read(reader);
+        while (line_next(&reader->line));
+        MtlMaterial *last = material_of(reader);
+        if (last) material_end(reader, last);
+        materials_sort(reader);
     }
-    text_free(&text);
-    return is_there;
+    report_include(reader->draft->import->report, &reader->report);
+    return true;
 }
 
 static bool library_of_word_read(MtlReader *reader, Word name)
 {
     MeshDraft *draft = reader->draft;
     bool is_moved;
-    char *path = draft_find_file(draft->import->path, name.text, name.length, &is_moved);
+    OWNED char *path = draft_find_file(draft->import->path, name.text, name.length, &is_moved);
     const bool read = library_read(reader, path);
     if (is_moved && read)
-        report_warning(&draft->report, name.offset, "no '%.*s': '%s' is used", WORD_TEXT(name), path);
-    free(path);
+        report_warning(&draft->report, name.offset, DRAFT_MOVED_FILE, WORD_TEXT(name), path);
     return read;
 }
 
@@ -375,10 +370,8 @@ static bool libraries_of_line_read(MtlReader *reader, Word names)
 static bool fallback_read(MtlReader *reader)
 {
     const char *obj_path = reader->draft->import->path;
-    char *path = text_format("%.*smtl", (int)(strlen(obj_path) - strlen("obj")), obj_path);
-    const bool read = library_read(reader, path);
-    free(path);
-    return read;
+    OWNED char *path = text_format("%.*smtl", (int)(strlen(obj_path) - strlen("obj")), obj_path);
+    return library_read(reader, path);
 }
 
 static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
@@ -387,7 +380,7 @@ static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
         const Word name = materials->libraries.items[i];
         if (libraries_of_line_read(reader, name) || fallback_read(reader)) continue;
         report_warning(&reader->draft->report, name.offset,
-                       "the material file '%.*s' cannot be read: the default material is used",
+                       "the material file '%.*s' cannot be read; the default material is used",
                        WORD_TEXT(name));
         return false;
     }
@@ -399,16 +392,11 @@ static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const M
 {
     if (!image->path) return 0;
     if (!draft_has(draft, DRAFT_UV)) {
-        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image->path,
-                   material->name);
+        draft_warn(draft, "the mesh has no texture coordinates for the image '%s' of material '%.40s'; %s",
+                   image->path, material->name, texture_fallback(image->content));
         return 0;
     }
-    const uint32_t texture =
-        scene_add_texture(draft->scene, image->path, NULL, image->content, draft->import->offset);
-    if (texture == 0)
-        draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
-                   material->name);
-    return texture;
+    return draft_add_checked_texture(draft, image->path, image->content, material->name);
 }
 
 // Sets the textures. Multiplies the image by the diffuse color, as MTL defines. Cuts out the parts that the
@@ -455,7 +443,7 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
         MtlMaterial *material = material_named(&reader, used->name);
         if (!material && all_read)
             unused_record(&unknown, &draft->report, used->name,
-                          "is in no material file: the default is used");
+                          "is in no material file; the default material is used");
         array_push(
             draft->materials,
             ((DraftMaterialRun){used->first_corner, material_use(draft, material ? material : &otherwise)}));

@@ -21,7 +21,7 @@ static void end_expect(ObjReader *reader)
 {
     if (reader->has_more_words || !line_has_word(&reader->line)) return;
     report_warning(&reader->draft->report, line_offset(&reader->line),
-                   "words after the last number of a row are not used");
+                   "words after the last number of a row are ignored");
     reader->has_more_words = true;
 }
 
@@ -35,10 +35,11 @@ static bool position_read(ObjReader *reader)
     const size_t offset = line_offset(&reader->line);
     Vector3 position = {numbers[0], numbers[1], numbers[2]};
     if (count == 4 && at_end) {
-        if (numbers[3] == 0) return draft_fails(draft, offset, "the fourth number of a vertex is 0");
+        if (numbers[3] == 0)
+            return draft_fails(draft, offset, "the fourth number of a vertex must not be zero");
         position = (Vector3){position.x / numbers[3], position.y / numbers[3], position.z / numbers[3]};
     } else if (count == 4 && !reader->has_colors) {
-        report_warning(&draft->report, offset, "colors of vertices are not used");
+        report_warning(&draft->report, offset, "%s", draft_colors);
         reader->has_colors = true;
     } else if (count == 3) {
         end_expect(reader);
@@ -82,10 +83,12 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
     if (part == DRAFT_POSITION && index == 0)
         return draft_fails(draft, offset, "a face names vertex 0; indices count from 1, or backward from -1");
     if (part == DRAFT_POSITION)
-        return draft_fails(draft, offset, "a face names vertex %lld; there are %zu before it",
+        return draft_fails(draft, offset,
+                           "a face names vertex %lld, but the file has only %zu before the face",
                            (long long)index, count);
     if (!reader->lacks[part])
-        report_warning(&draft->report, offset, "a face names %s %lld; there are %zu before it: not used",
+        report_warning(&draft->report, offset,
+                       "a face names %s %lld, but the file has only %zu before the face; it is ignored",
                        draft_part_names[part], (long long)index, count);
     reader->lacks[part] = true;
     array_push(draft->corners[part], DRAFT_NONE);
@@ -181,7 +184,7 @@ static bool line_read(ObjReader *reader)
     if (word.length == 0) return true;
     for (size_t i = 0; i < COUNT_OF(statements); i++)
         if (word_is(word, statements[i].word)) return !statements[i].read || statements[i].read(reader);
-    unused_record(&reader->unused, &reader->draft->report, word, "is not used");
+    unused_record(&reader->unused, &reader->draft->report, word, "is not supported and is ignored");
     return true;
 }
 

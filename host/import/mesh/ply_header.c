@@ -17,7 +17,7 @@ static bool format_read(PlyHeader *header, Line *line)
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (word_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           report_error(line->report, word.offset, "'%.*s' is not a format of PLY", WORD_TEXT(word));
+           report_error(line->report, word.offset, "there is no PLY format '%.*s'", WORD_TEXT(word));
 }
 
 // Reads a count of at most 18 digits. No file has as many rows as a longer number.
@@ -37,8 +37,8 @@ static bool element_read(PlyHeader *header, Line *line)
     PlyElement element = {.name = line_word(line), .first_property = header->properties.count};
     Word count = line_word(line);
     if (!count_read(count, &element.count))
-        return report_error(line->report, count.offset, "'%.*s' is not a number of '%.*s'", WORD_TEXT(count),
-                            WORD_TEXT(element.name));
+        return report_error(line->report, count.offset, "the number of '%.*s' must be whole, not '%.*s'",
+                            WORD_TEXT(element.name), WORD_TEXT(count));
     array_push(header->elements, element);
     return true;
 }
@@ -61,13 +61,13 @@ static const PlyType *type_of(Word word)
 static bool type_read(Line *line, Word word, const PlyType **type)
 {
     *type = type_of(word);
-    return *type || report_error(line->report, word.offset, "'%.*s' is not a type of PLY", WORD_TEXT(word));
+    return *type || report_error(line->report, word.offset, "there is no PLY type '%.*s'", WORD_TEXT(word));
 }
 
 static bool property_read(PlyHeader *header, Line *line)
 {
     if (header->elements.count == 0)
-        return report_error(line->report, line_offset(line), "a property before the first element");
+        return report_error(line->report, line_offset(line), "a property must follow an element");
     PlyProperty property = {0};
     Word word = line_word(line);
     if (word_is(word, "list")) {
@@ -77,7 +77,7 @@ static bool property_read(PlyHeader *header, Line *line)
     if (!type_read(line, word, &property.type)) return false;
     property.name = line_word(line);
     if (property.name.length == 0)
-        return report_error(line->report, line_offset(line), "a property without a name");
+        return report_error(line->report, line_offset(line), "the property has no name");
     array_push(header->properties, property);
     header->elements.items[header->elements.count - 1].property_count++;
     return true;
@@ -102,14 +102,14 @@ bool ply_header_read(PlyHeader *header, Line *line)
 {
     const Source *source = line->report->source;
     if (source->length < 3 || strncasecmp(source->bytes, "ply", 3) != 0)
-        return report_error(line->report, 0, "not a PLY file, which starts with a line 'ply'");
+        return report_error(line->report, 0, "a PLY file must start with a line 'ply'");
     while (line_next(line)) {
         if (is_end_of_header(*line))
             return header->format != PLY_NO_FORMAT ||
-                   report_error(line->report, line->start, "the header lacks its format");
+                   report_error(line->report, line->start, "the header lacks a line 'format'");
         if (!header_line_read(header, line)) return false;
     }
-    return report_error(line->report, source->length, "the header lacks its end, a line 'end_header'");
+    return report_error(line->report, source->length, "the header lacks a line 'end_header'");
 }
 
 void ply_header_free(PlyHeader *header)

@@ -81,8 +81,9 @@ static bool elements_are_sound(PlyReader *reader)
     for (size_t i = 0; i < reader->header.elements.count; i++) {
         Word name = elements[i].name;
         if (word_is(name, "tristrips") && elements[i].count > 0)
-            return draft_fails(reader->draft, name.offset,
-                               "strips of triangles (tristrips) are not read, only faces");
+            return draft_fails(
+                reader->draft, name.offset,
+                "strips of triangles (tristrips) are not supported; export the mesh with faces");
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
             if (words_equal(name, elements[k].name))
                 return draft_fails(reader->draft, name.offset, "the header declares '%.*s' twice",
@@ -94,7 +95,7 @@ static bool elements_are_sound(PlyReader *reader)
 // Warns of an element that is not used, or of the unused properties of one that is.
 static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
 {
-    Text unused = {0};
+    OwnedText unused = {0};
     const PlyProperty *first = NULL;
     for (size_t i = 0; i < element->property_count; i++) {
         const PlyProperty *property = &properties_of(reader, element)[i];
@@ -104,11 +105,10 @@ static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
     }
     const Word name = element->name;
     if (!is_wanted(element))
-        report_warning(&reader->draft->report, name.offset, "the element '%.*s' is not used",
-                       WORD_TEXT(name));
+        report_warning(&reader->draft->report, name.offset, "the element '%.*s' is ignored", WORD_TEXT(name));
     else if (first)
-        report_warning(&reader->draft->report, first->name.offset, "not used:%s", text_c(&unused));
-    text_free(&unused);
+        report_warning(&reader->draft->report, first->name.offset,
+                       "these properties of '%.*s' are ignored:%s", WORD_TEXT(name), text_c(&unused));
 }
 
 static bool is_binary(const PlyReader *reader)
@@ -119,8 +119,9 @@ static bool is_binary(const PlyReader *reader)
 static bool value_missing(PlyReader *reader, const PlyProperty *property)
 {
     Word element = reader->element->name;
-    return draft_fails(reader->draft, line_offset(&reader->line), "%.*s %zu (from 0) lacks its '%.*s'",
-                       WORD_TEXT(element), reader->row, WORD_TEXT(property->name));
+    return draft_fails(reader->draft, line_offset(&reader->line),
+                       "%.*s %zu (counted from 0) lacks its '%.*s'", WORD_TEXT(element), reader->row,
+                       WORD_TEXT(property->name));
 }
 
 // Reads a whole number of 32 bits.
@@ -218,7 +219,7 @@ static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t of
 {
     Word element = reader->element->name;
     return draft_fails(reader->draft, offset,
-                       "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
+                       "%.*s %zu (counted from 0) declares %.15g numbers of '%.*s', but the %s has only %zu",
                        WORD_TEXT(element), reader->row, promised, WORD_TEXT(property->name),
                        is_binary(reader) ? "file" : "line", held);
 }
@@ -237,7 +238,7 @@ static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *n
         const size_t most = bytes_left(reader) / property->type->size;
         if (!is_count(count) || count > (double)most) return list_fails(reader, property, start, count, most);
     } else if (!is_count(count)) {
-        return draft_fails(reader->draft, start, "%.15g is not the length of a list", count);
+        return draft_fails(reader->draft, start, "the length of a list must be whole, not %.15g", count);
     }
     for (size_t i = 0; (double)i < count; i++) {
         double value;
@@ -272,8 +273,8 @@ static bool row_start(PlyReader *reader)
 {
     return line_next_filled(&reader->line) ||
            draft_fails(reader->draft, reader->draft->source.length,
-                       "the file ends before %.*s %zu (from 0) of %zu", WORD_TEXT(reader->element->name),
-                       reader->row, reader->element->count);
+                       "the file ends before %.*s %zu (counted from 0) of %zu",
+                       WORD_TEXT(reader->element->name), reader->row, reader->element->count);
 }
 
 static bool vertex_add(PlyReader *reader)
@@ -293,14 +294,15 @@ static bool face_add(PlyReader *reader)
     const size_t offset = line_offset(&reader->line), count = reader->corners.count;
     if (reader->corner_uvs.count > 2 * count)
         return draft_fails(reader->draft, offset,
-                           "face %zu (from 0) has %zu corner%s, but %zu texture coordinate%s", reader->row,
-                           count, text_plural(count), reader->corner_uvs.count / 2,
+                           "face %zu (counted from 0) has %zu corner%s, but %zu texture coordinate%s",
+                           reader->row, count, text_plural(count), reader->corner_uvs.count / 2,
                            text_plural(reader->corner_uvs.count / 2));
     for (size_t i = 0; i < count; i++) {
         const double index = reader->corners.items[i];
         if (!(index >= 0 && index <= UINT32_MAX && floor(index) == index))
-            return draft_fails(reader->draft, offset, "face %zu (from 0) names vertex %.15g", reader->row,
-                               index);
+            return draft_fails(reader->draft, offset,
+                               "face %zu (counted from 0) names vertex %.15g, which cannot exist",
+                               reader->row, index);
         draft_add_index(draft, DRAFT_POSITION, (uint32_t)index, offset);
         if (!reader->has_role[ROLE_CORNER_UVS]) continue;
         const bool has_uv = 2 * i + 1 < reader->corner_uvs.count;
@@ -320,7 +322,7 @@ static bool row_read(PlyReader *reader)
     if (!is_wanted(reader->element)) return true;
     if (!is_binary(reader) && !reader->has_more_words && line_peek(&reader->line).length > 0) {
         report_warning(&reader->draft->report, line_peek(&reader->line).offset,
-                       "words after the last property of a row are not used");
+                       "words after the last property of a row are ignored");
         reader->has_more_words = true;
     }
     return word_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
@@ -387,11 +389,11 @@ static void warn_of_rest(PlyReader *reader)
 {
     const size_t rest = bytes_left(reader);
     if (is_binary(reader) && rest > 0)
-        draft_warn(reader->draft, "%zu byte%s after the last element %s not used", rest, text_plural(rest),
-                   rest == 1 ? "is" : "are");
+        draft_warn(reader->draft, "%zu byte%s after the last element %s ignored", rest, text_plural(rest),
+                   text_is_are(rest));
     else if (!is_binary(reader) && line_next_filled(&reader->line))
         report_warning(&reader->draft->report, line_peek(&reader->line).offset,
-                       "lines after the last element are not used");
+                       "lines after the last element are ignored");
 }
 
 bool ply_read(MeshDraft *draft)

@@ -32,7 +32,8 @@ static bool facet_end(StlReader *reader, size_t offset)
     const size_t count = reader->corner_count;
     reader->corner_count = 0;
     if (count > 0 && count < 3)
-        return draft_fails(reader->draft, offset, "a facet of %zu corner%s", count, text_plural(count));
+        return draft_fails(reader->draft, offset, "a facet has %zu corner%s instead of 3", count,
+                           text_plural(count));
     return draft_end_face(reader->draft, offset);
 }
 
@@ -46,7 +47,7 @@ static bool line_read(StlReader *reader)
         return facet_end(reader, word.offset);
     for (size_t i = 0; i < COUNT_OF(known); i++)
         if (word_is_in_any_case(word, known[i])) return true;
-    unused_record(&reader->unused, &reader->draft->report, word, "is not used");
+    unused_record(&reader->unused, &reader->draft->report, word, "is not a keyword of STL and is ignored");
     return true;
 }
 
@@ -81,14 +82,16 @@ static bool binary_read(MeshDraft *draft)
     draft->places = DRAFT_BYTES;
     if (source->length < HEADER_SIZE)
         return draft_fails(draft, source->length,
-                           "not an STL file, which starts with 'solid' or has %d bytes before its facets",
+                           "an STL file must start with 'solid' or have %d bytes before its facets",
                            HEADER_SIZE);
     const size_t count = facet_count(source);
     const size_t held = (source->length - HEADER_SIZE) / FACET_SIZE;
-    if (count >= DRAFT_NONE / 3) return draft_fails(draft, HEADER_SIZE - 4, "too many facets");
+    if (count > DRAFT_VERTICES_MAX / 3)
+        return draft_fails(draft, HEADER_SIZE - 4, "%zu facets are declared; at most %u are supported", count,
+                           DRAFT_VERTICES_MAX / 3);
     if (count > held)
-        return draft_fails(draft, HEADER_SIZE - 4, "%zu facet%s declared, the file has %zu", count,
-                           count == 1 ? " is" : "s are", held);
+        return draft_fails(draft, HEADER_SIZE - 4, "%zu facet%s %s declared, but the file has only %zu",
+                           count, text_plural(count), text_is_are(count), held);
     bool has_attributes = false;
     for (size_t i = 0; i < count; i++) {
         const size_t offset = HEADER_SIZE + i * FACET_SIZE;
@@ -103,11 +106,11 @@ static bool binary_read(MeshDraft *draft)
         has_attributes |= facet[FACET_ATTRIBUTE] != 0 || facet[FACET_ATTRIBUTE + 1] != 0;
         if (!draft_end_face(draft, offset)) return false;
     }
-    if (has_attributes) draft_warn(draft, "attributes of facets, such as colors, are not used");
+    if (has_attributes) draft_warn(draft, "attributes of facets, such as colors, are ignored");
     const size_t rest = source->length - HEADER_SIZE - count * FACET_SIZE;
     if (rest > 0)
-        draft_warn(draft, "%zu byte%s after the last facet %s not used", rest, text_plural(rest),
-                   rest == 1 ? "is" : "are");
+        draft_warn(draft, "%zu byte%s after the last facet %s ignored", rest, text_plural(rest),
+                   text_is_are(rest));
     return true;
 }
 

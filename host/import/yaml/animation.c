@@ -74,7 +74,7 @@ static bool keys_read(YamlReader *reader, const YamlNode *frames, Keys *keys)
                                 "frame %g must be greater than frame %g before it", key.frame,
                                 keys->items[keys->count - 1].frame);
         if (++reader->key_count > KEYS_MAX)
-            return report_error(&reader->report, name->offset, "more than %d keys", KEYS_MAX);
+            return report_error(&reader->report, name->offset, "a scene may have at most %d keys", KEYS_MAX);
         if (!values_match(reader, before ? before : value, value)) return false;
         array_push(*keys, key);
         before = value;
@@ -152,21 +152,19 @@ static bool value_animate(YamlReader *reader, uint32_t index)
         {"keys", read_node, offsetof(Animation, keys), REQUIRED},
         {"ease", read_ease, offsetof(Animation, ease)},
     };
-    Keys keys = {0};
+    OWNED Keys keys = {0};
     Animation animation = {.ease = EASE_LINEAR};
-    const bool is_read = fields_read(reader, yaml_node(&reader->tree, index), "animation", fields,
-                                     COUNT_OF(fields), &animation) &&
-                         keys_read(reader, animation.keys, &keys);
-    if (is_read) {
-        YamlNode value =
-            *yaml_node(&reader->tree, keys_value(reader, &keys, animation.ease, reader->options->frame));
-        value.next = yaml_node(&reader->tree, index)->next;
-        reader->tree.nodes.items[index] = value;
-        reader->scene->animation.has_keys = true;
-        reader->scene->animation.frame = reader->options->frame;
-    }
-    free(keys.items);
-    return is_read;
+    if (!fields_read(reader, yaml_node(&reader->tree, index), "animation", fields, COUNT_OF(fields),
+                     &animation) ||
+        !keys_read(reader, animation.keys, &keys))
+        return false;
+    YamlNode value =
+        *yaml_node(&reader->tree, keys_value(reader, &keys, animation.ease, reader->options->frame));
+    value.next = yaml_node(&reader->tree, index)->next;
+    reader->tree.nodes.items[index] = value;
+    reader->scene->animation.has_keys = true;
+    reader->scene->animation.frame = reader->options->frame;
+    return true;
 }
 
 // Animates the values in a node. `visited` has a bit per node, which is set once the children that begin
@@ -189,9 +187,7 @@ static bool node_animate(YamlReader *reader, uint32_t index, uint8_t *visited)
 
 bool yaml_animate(YamlReader *reader)
 {
-    uint8_t *visited =
+    OWNED uint8_t *visited =
         reader->tree.has_aliases ? memory_allocate_zeroed(reader->tree.nodes.count / 8 + 1, 1) : NULL;
-    const bool all_read = node_animate(reader, 0, visited);
-    free(visited);
-    return all_read;
+    return node_animate(reader, 0, visited);
 }

@@ -80,7 +80,7 @@ static bool not_a_color_report(YamlReader *reader, const Field *field, const Yam
     const char *nearest = strlen(text) <= WORD_SHOWN ? text_nearest(text, names, NAMED_COUNT) : NULL;
     if (nearest)
         return report_error(&reader->report, node->offset,
-                            "'%s' must be a color, not '%s': did you mean '%s'?", field->name, text, nearest);
+                            "'%s' must be a color, not '%s'; did you mean '%s'?", field->name, text, nearest);
     // `color: #ff8000` ends before its comment.
     if (text[0] == '\0') expected = "a color (one that begins with # needs quotes, '#ff8000')";
     return expected_report(reader, field->name, expected, node);
@@ -111,7 +111,7 @@ static bool color_is_linear(YamlReader *reader, const Field *field, const YamlNo
     const Color linear = color_of_srgb(rgb);
     return report_error(
         &reader->report, node->offset,
-        "'%s' is linear, with 1 for full; for values of 0 to 255 write '#%06x' or [%.4g, %.4g, %.4g]",
+        "'%s' is linear, and 1 is full; for values from 0 to 255, write '#%06x' or [%.4g, %.4g, %.4g]",
         field->name, (unsigned)rgb, linear.x, linear.y, linear.z);
 }
 

@@ -1,6 +1,7 @@
 #include "host/import/yaml/fields.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,7 +70,7 @@ static const char *name_meant(const char *word, Names names)
 void choices_describe(Text *text, const char *word, Names names)
 {
     const char *meant = name_meant(word, names);
-    if (meant) text_appendf(text, ": did you mean '%.*s'?", WORD_SHOWN, meant);
+    if (meant) text_appendf(text, "; did you mean '%.*s'?", WORD_SHOWN, meant);
     if (names.count < 2 || names.count > LISTED_MAX) return;
     text_appendf(text, meant ? " The choices are " : "; the choices are ");
     for (size_t i = 0; i < names.count; i++)
@@ -79,12 +80,10 @@ void choices_describe(Text *text, const char *word, Names names)
 bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, Names names)
 {
     const char *word = yaml_text(&reader->tree, node);
-    Text choices = {0};
+    OwnedText choices = {0};
     choices_describe(&choices, word, names);
-    report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", type, WORD_SHOWN, word,
-                 text_c(&choices));
-    text_free(&choices);
-    return false;
+    return report_error(&reader->report, node->offset, "there is no %s '%.*s'%s", type, WORD_SHOWN, word,
+                        text_c(&choices));
 }
 
 void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before)
@@ -95,22 +94,20 @@ void twice_report(YamlReader *reader, const char *type, const char *name, size_t
         report_error(&reader->report, offset, "%s '%.*s' is given twice", type, WORD_SHOWN, name);
         return;
     }
-    char *place = message_place_text(source, before);
+    OWNED char *place = message_place_text(source, before);
     report_error(&reader->report, offset, "%s '%.*s' is already given at %s", type, WORD_SHOWN, name, place);
-    free(place);
 }
 
-static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what, Names names)
+static bool unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what, Names names)
 {
     char type[64];
     snprintf(type, sizeof type, "%s key", what);
-    unknown_report(reader, key, type, names);
+    return unknown_report(reader, key, type, names);
 }
 
 bool key_is_word(YamlReader *reader, const YamlNode *key)
 {
-    if (key->type == YAML_SCALAR) return true;
-    return report_error(&reader->report, key->offset, "a key must be a word");
+    return key->type == YAML_SCALAR || report_error(&reader->report, key->offset, "a key must be a word");
 }
 
 static Form field_forms(const Field *field)
@@ -140,33 +137,30 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
 {
     const Names names = {fields, field_count, sizeof *fields};
     if (!node_has_type(reader, mapping, YAML_MAPPING, what)) return false;
-    size_t errors_before = reader->report.error_count;
-    bool seen[FIELDS_MAX] = {false};
+    bool seen[FIELDS_MAX] = {false}, all_read = true, is_mixed = false;
     Form forms = FORM_ANY;
-    bool mixed = false;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key && !report_is_full(&reader->report);
          key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
-        if (!key_is_word(reader, key)) continue;
         size_t index = name_find(names, yaml_text(&reader->tree, key));
         const Field *field = &fields[index];
         if (index == field_count)
-            unknown_field_report(reader, key, what, names);
+            all_read = key_is_word(reader, key) && unknown_field_report(reader, key, what, names);
         else if (seen[index])
-            report_error(&reader->report, key->offset, "'%s' is given twice", field->name);
+            all_read = report_error(&reader->report, key->offset, "'%s' is given twice", field->name);
         else if (form_narrow(reader, key, field, fields, seen, &forms))
-            field->read(reader, field, value, (char *)target + field->offset);
+            all_read &= field->read(reader, field, value, (char *)target + field->offset);
         else
-            mixed = true;
+            is_mixed = true;
         if (index < field_count) seen[index] = true;
     }
     const Form chosen = forms & -forms; // the first
-    for (size_t i = 0; i < field_count && !mixed; i++) {
+    for (size_t i = 0; i < field_count && !is_mixed; i++)
         if ((fields[i].forms & REQUIRED) && (field_forms(&fields[i]) & chosen) && !seen[i])
-            report_error(&reader->report, mapping->offset, "%s lacks '%s'", what, fields[i].name);
-    }
-    return reader->report.error_count == errors_before ? chosen : 0;
+            all_read =
+                report_error(&reader->report, mapping->offset, "the %s lacks '%s'", what, fields[i].name);
+    return all_read && !is_mixed ? chosen : 0;
 }
 
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name)
@@ -190,7 +184,7 @@ size_t choice_read(YamlReader *reader, const YamlNode *node, const char *type, N
                    const YamlNode **value)
 {
     if (node->type != YAML_MAPPING || node->child_count != 2) {
-        report_error(&reader->report, node->offset, "expected one %s, such as `%s: {...}`", type,
+        report_error(&reader->report, node->offset, "an item must be one %s, such as `%s: {...}`", type,
                      name_at(names, 0));
         return names.count;
     }
@@ -247,10 +241,9 @@ bool read_vector(YamlReader *reader, const Field *field, const YamlNode *node, v
 
 bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    if (!read_vector(reader, field, node, target)) return false;
-    if (vector_is_zero(*(const Vector3 *)target))
-        return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
-    return true;
+    return read_vector(reader, field, node, target) &&
+           (!vector_is_zero(*(const Vector3 *)target) ||
+            report_error(&reader->report, node->offset, "'%s' must not be zero", field->name));
 }
 
 bool read_boolean(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -20,7 +20,7 @@ static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
     reader->copy_count += count;
     return reader->copy_count <= largest ||
            report_error(&reader->report, node->offset,
-                        "definitions, instances and repeated groups have more than %d objects", COPIES_MAX);
+                        "definitions, instances and repeated groups may have at most %d objects", COPIES_MAX);
 }
 
 // Returns whether a transform moves the object but not its pattern. Images on spheres have poles along y,
@@ -129,7 +129,8 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
             continue;
         }
         if (reader->definitions.count == DEFINITIONS_MAX) {
-            report_error(&reader->report, key->offset, "more than %d definitions", DEFINITIONS_MAX);
+            report_error(&reader->report, key->offset, "a scene may have at most %d definitions",
+                         DEFINITIONS_MAX);
             return;
         }
         if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects) &&
@@ -144,12 +145,11 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 // Frees the meshes that no object of the scene uses and leaves them empty.
 static void unused_meshes_free(Scene *scene)
 {
-    bool *is_used = memory_allocate_zeroed(scene->meshes.count, sizeof *is_used);
+    OWNED bool *is_used = memory_allocate_zeroed(scene->meshes.count, sizeof *is_used);
     for (size_t i = 0; i < scene->objects.count; i++)
         if (scene->objects.items[i].type == SHAPE_MESH) is_used[scene->objects.items[i].as.mesh.index] = true;
     for (size_t i = 0; i < scene->meshes.count; i++)
         if (!is_used[i]) mesh_free(&scene->meshes.items[i]);
-    free(is_used);
 }
 
 void yaml_definitions_free(YamlReader *reader)

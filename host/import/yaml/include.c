@@ -179,13 +179,9 @@ static bool file_read(Includes *includes, Joined *joined, const char *path, cons
 {
     YamlReader *reader = includes->reader;
     Text text = {0};
-    MessageList problems = {0};
-    const size_t offset = node->offset; // the tree's nodes move
-    if (!text_read_file(&text, path, &problems)) {
-        report_error(&reader->report, offset, "%s", problems.items[0].text);
-        message_list_free(&problems);
-        return false;
-    }
+    OwnedMessageList problems = {0};
+    if (!text_read_file(&text, path, &problems))
+        return report_error(&reader->report, node->offset, "%s", problems.items[0].text);
     KnownFile *known = &includes->files[includes->file_count - 1];
     uint32_t root;
     if (!text_parse(includes, source_add(includes, path, &text), &root)) return false;
@@ -203,27 +199,21 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
     const char *name = yaml_text(&reader->tree, node);
     if (!scene_is_yaml(name) || strcmp(name, "-") == 0)
         return expected_report(reader, "include", "a YAML file (.yaml, .yml or .json)", node);
-    char *path = yaml_read_path(reader, "include", node);
+    OWNED char *path = yaml_read_path(reader, "include", node);
     const char *obstacle = file_obstacle(path);
+    if (obstacle) return report_error(&reader->report, node->offset, "cannot read '%s': %s", path, obstacle);
     const FileId file = file_id(path);
     size_t known = 0;
-    bool is_read = !obstacle;
     while (known < includes->file_count && !file_is_same(includes->files[known].file, file))
         known++;
-    if (obstacle) {
-        report_error(&reader->report, node->offset, "cannot read '%s': %s", path, obstacle);
-    } else if (known < includes->file_count) {
-        if (includes->files[known].is_open)
-            is_read = report_error(&reader->report, node->offset, "recursive include of '%s'", path);
-    } else if (includes->file_count == COUNT_OF(includes->files)) {
-        includes->is_full = true;
-        is_read = report_error(&reader->report, node->offset, "more than %d included files", FILES_MAX);
-    } else {
-        includes->files[includes->file_count++] = (KnownFile){.file = file};
-        is_read = file_read(includes, joined, path, node);
-    }
-    free(path);
-    return is_read;
+    if (known < includes->file_count)
+        return !includes->files[known].is_open ||
+               report_error(&reader->report, node->offset, "'%s' includes itself", path);
+    includes->is_full = includes->file_count == COUNT_OF(includes->files);
+    if (includes->is_full)
+        return report_error(&reader->report, node->offset, "a scene may include at most %d files", FILES_MAX);
+    includes->files[includes->file_count++] = (KnownFile){.file = file};
+    return file_read(includes, joined, path, node);
 }
 
 // Removes the `include` of a mapping. Returns the index of its value, or 0 if there is none.
@@ -239,7 +229,7 @@ static uint32_t include_remove(const Includes *includes, uint32_t root)
             continue;
         }
         if (found > 0)
-            report_error(&reader->report, key->offset, "'%s' is given twice", "include");
+            report_error(&reader->report, key->offset, "'include' is given twice");
         else
             found = key->next;
         *link = value->next;

@@ -1,4 +1,5 @@
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/import/yaml/yaml.h"
 
 #include <stdlib.h>
@@ -127,16 +128,13 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
         return false;
     if (nodes.layer && !yaml_text(&reader->tree, nodes.layer)[0])
         return expected_report(reader, "layer", "the name of a layer", nodes.layer);
-    char *path = yaml_read_path(reader, field->name, nodes.file);
+    OWNED char *path = yaml_read_path(reader, field->name, nodes.file);
     if (!path) return false;
     node = nodes.file;
     const char *layer = nodes.layer ? yaml_text(&reader->tree, nodes.layer) : NULL;
-    const uint32_t texture = scene_add_texture(reader->scene, path, layer, content, node->offset);
-    free(path);
-    if (texture == 0)
-        report_error(&reader->report, node->offset, "more than %d textures", SCENE_TEXTURES_MAX);
-    *target = texture;
-    return texture > 0;
+    *target = scene_add_texture(reader->scene, path, layer, content, node->offset);
+    return *target > 0 || report_error(&reader->report, node->offset, "a scene may have at most %d textures",
+                                       SCENE_TEXTURES_MAX);
 }
 
 bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -181,24 +179,28 @@ static void energy_check(YamlReader *reader, const Material *material, const Yam
     const bool is_fraction_of_transmission = material->fresnel && transmission > 0;
     if (reflection + transmission <= 1 + 1e-9) return;
     report_warning(&reader->report, field_node(reader, node, "reflection")->offset,
-                   "reflection %g and transmission %g exceed 1 together: the surface adds light%s",
+                   "reflection %g and transmission %g exceed 1 together, so the surface adds light%s",
                    reflection, transmission,
                    is_fraction_of_transmission ? "; by 'fresnel' it reflects a part of its transmission"
                                                : "");
 }
 
-// Reports keys that have a meaning only with textures.
-static void textures_check(YamlReader *reader, const Material *material, const YamlNode *node)
+// Reports keys that have a meaning only with textures, and returns false if there are any.
+static bool textures_check(YamlReader *reader, const Material *material, const YamlNode *node)
 {
     const YamlNode *size = field_node(reader, node, "size"),
                    *strength = field_node(reader, node, "normal_strength");
+    bool fit = true;
     if (size != node && material->image.texture == 0 && material->normal_map.texture == 0)
-        report_error(&reader->report, size->offset, "'size' needs an 'image' or a 'normal_map'");
+        fit = report_error(&reader->report, size->offset, "'size' needs an 'image' or a 'normal_map'");
     if (strength != node && material->normal_map.texture == 0)
-        report_error(&reader->report, strength->offset, "'normal_strength' needs a 'normal_map'");
+        fit = report_error(&reader->report, strength->offset, "'normal_strength' needs a 'normal_map'");
+    return fit;
 }
 
-static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
+// Adds a material, which is the default one for a `node` of NULL. Reports errors and returns false if it is
+// invalid.
+static bool material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
         {"color", read_color, offsetof(Material, color), FORM_FIRST},
@@ -229,15 +231,16 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         material.ambient = 0;
         material.diffuse = vector_all(0);
     }
-    const bool is_read = node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material);
-    if (is_read) textures_check(reader, &material, node);
+    bool is_read =
+        !node || (fields_read(reader, node, "material", fields, COUNT_OF(fields), &material) != 0 &&
+                  textures_check(reader, &material, node));
     if (material.cutout.threshold > 0) material.cutout.texture = material.image.texture;
     if (conductor != node && (material.fresnel || material.transmission.largest > 0))
-        report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
-                     material.fresnel ? "fresnel" : "transmission");
-    else if (is_read)
-        energy_check(reader, &material, node);
+        is_read = report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
+                               material.fresnel ? "fresnel" : "transmission");
+    if (is_read && node) energy_check(reader, &material, node);
     scene_add_material(reader->scene, &material, name);
+    return is_read;
 }
 
 static int names_compare(const void *a, const void *b)
@@ -279,8 +282,8 @@ static bool unknown_material_report(YamlReader *reader, const YamlNode *node)
     const char *text = yaml_text(&reader->tree, node), *quote = text[0] == '#' ? "'" : "";
     if (is_color_text(text))
         return report_error(&reader->report, node->offset,
-                            "unknown material '%s'; for the color write {color: %s%s%s}", text, quote, text,
-                            quote);
+                            "there is no material '%s'; for the color, write {color: %s%s%s}", text, quote,
+                            text, quote);
     const Names names = {reader->names.items, reader->names.count, sizeof(MaterialName)};
     return unknown_report(reader, node, "material", names);
 }
@@ -290,8 +293,7 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
     uint32_t *index = target;
     if (node->type == YAML_MAPPING) {
         *index = (uint32_t)reader->scene->materials.count;
-        material_append(reader, node, "");
-        return true;
+        return material_append(reader, node, "");
     }
     if (!yaml_text(&reader->tree, node)[0])
         return expected_report(reader, field->name, "the name of a material or a mapping", node);

@@ -1,5 +1,6 @@
 // Reads `mesh:` of YAML scenes.
 #include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/yaml/yaml.h"
 
@@ -22,7 +23,7 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
     };
     MeshFields read = {.transform = affine_identity, .material = UINT32_MAX};
     if (!fields_read(reader, mapping, "mesh", fields, COUNT_OF(fields), &read)) return;
-    char *path = yaml_read_path(reader, "file", read.file);
+    OWNED char *path = yaml_read_path(reader, "file", read.file);
     if (!path) return;
     MeshSmoothing smoothing = SMOOTH_AS_FILE;
     if (field_node(reader, mapping, "smooth") != mapping)
@@ -37,11 +38,8 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         .offset = read.file->offset,
     };
     Object object = {.type = SHAPE_MESH, .material = read.material};
-    if (mesh_import(reader->scene, &import, &object.as.mesh.index)) {
-        reader->scene->meshes.items[object.as.mesh.index].path = path;
-        path = NULL;
-        if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-        if (yaml_material_fits(reader, &object, mapping)) array_push(reader->scene->objects, object);
-    }
-    free(path);
+    if (!mesh_import(reader->scene, &import, &object.as.mesh.index)) return;
+    reader->scene->meshes.items[object.as.mesh.index].path = memory_release(&path);
+    if (object.material == UINT32_MAX) object.material = material_default_index(reader);
+    if (yaml_material_fits(reader, &object, mapping)) array_push(reader->scene->objects, object);
 }

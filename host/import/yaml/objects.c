@@ -125,7 +125,7 @@ static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form fo
     const Vector3 *vertices = object->as.triangle.vertices;
     object->as.triangle.smooth = !vector_is_zero(object->as.triangle.normals[0]);
     if (!triangle_has_area(vertices[0], vertices[1], vertices[2]))
-        report_warning(&reader->report, mapping->offset, "a triangle without area is never hit");
+        report_warning(&reader->report, mapping->offset, "the triangle has no area and is never hit");
     return true;
 }
 
@@ -183,7 +183,8 @@ static bool superellipsoid_finish(YamlReader *reader, const YamlNode *mapping, F
     axes[1] = (Vector3){0, radii.y, 0};
     axes[2] = (Vector3){0, 0, radii.z};
     if (!axes_are_moderate(axes))
-        return field_fails(reader, mapping, "radii", "'radii' must be within a factor of a million");
+        return field_fails(reader, mapping, "radii",
+                           "'radii' must be within a factor of a million of each other");
     return fmod(object->as.superellipsoid.exponent, 2) == 0 ||
            field_fails(reader, mapping, "exponent", "'exponent' must be an even number from 2 to 16");
 }
@@ -221,7 +222,8 @@ bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode
     const YamlNode *node = field_node(reader, mapping, "material");
     if (object->type == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
-               report_error(&reader->report, node->offset, "the mesh has no uv for the material's images");
+               report_error(&reader->report, node->offset,
+                            "the mesh has no texture coordinates for the material's images");
     return (object->type != SHAPE_OVAL && shapes[object->type].takes_texture) ||
            report_error(&reader->report, node->offset,
                         "images and normal maps lie on a sphere, plane, disc or mesh, not on a %s%s",

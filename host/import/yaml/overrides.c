@@ -50,15 +50,14 @@ static bool node_is(const Path *path, YamlType type)
     static const char *const names[] = {
         [YAML_SCALAR] = "a value", [YAML_SEQUENCE] = "a list", [YAML_MAPPING] = "a mapping"};
     const YamlType found = yaml_node(path->tree, path->node)->type;
-    if (found == type) return true;
-    return report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path), names[found],
-                        names[type]);
+    return found == type || report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path),
+                                         names[found], names[type]);
 }
 
 static bool path_report(const Path *path)
 {
     return report_error(path->report, path->at,
-                        "expected PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
+                        "a value is set by PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
 }
 
 static bool is_last(const Path *path)
@@ -85,12 +84,10 @@ static bool missing_report(const Path *path, const char *name, size_t start)
     for (const YamlNode *key = yaml_first(path->tree, yaml_node(path->tree, path->node));
          key && known_count < NAMES_COMPARED_MAX; key = yaml_next(path->tree, yaml_next(path->tree, key)))
         if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
-    Text choices = {0};
+    OwnedText choices = {0};
     choices_describe(&choices, name, (Names){known, known_count, sizeof *known});
-    report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
-                 text_c(&choices));
-    text_free(&choices);
-    return false;
+    return report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
+                        text_c(&choices));
 }
 
 // Moves the path to a child of its node.
@@ -149,7 +146,7 @@ static bool index_read(Path *path)
     const size_t start = path->at, digits = strspn(path->text + start + 1, "0123456789");
     path->at += 1 + digits;
     if (digits == 0 || digits > 9 || path->text[path->at] != ']')
-        return report_error(path->report, start, "expected an index, such as [0]");
+        return report_error(path->report, start, "an index must be a number in brackets, such as [0]");
     path->at++;
     return index_follow(path, (uint32_t)strtoul(path->text + start + 1, NULL, 10), start);
 }
@@ -164,10 +161,8 @@ static bool name_read(Path *path)
     path->at = start + length;
     if (length == 0 || (is_quoted && path->text[path->at] != first)) return path_report(path);
     path->at += is_quoted;
-    char *name = memory_copy_part(path->text + start, length);
-    const bool followed = key_follow(path, name, start);
-    free(name);
-    return followed;
+    OWNED char *name = memory_copy_part(path->text + start, length);
+    return key_follow(path, name, start);
 }
 
 // Moves the path to the node that the override's PATH names, and `at` past its `=`.

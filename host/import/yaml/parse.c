@@ -10,6 +10,8 @@
 
 enum { DEPTH_MAX = 32, ANCHORS_MAX = 1000 };
 
+static const char not_well_formed[] = "the text is not well-formed YAML";
+
 typedef struct {
     size_t text, length; // name in the source
     uint32_t node;
@@ -77,10 +79,10 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
     node.type = YAML_SCALAR;
     node.text = (uint32_t)texts->count;
     if (token && !token_append_text(texts, token, builder->parsed))
-        return report_error(builder->report, node.offset, "not well-formed YAML");
+        return report_error(builder->report, node.offset, not_well_formed);
     text_append(texts, "", 1);
     if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1))
-        return report_error(builder->report, node.offset, "a text with a NUL character in it");
+        return report_error(builder->report, node.offset, "texts must not contain NUL characters");
     node_append(builder, node);
     return true;
 }
@@ -88,7 +90,8 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
 static bool collection_open(TreeBuilder *builder, YamlNode node)
 {
     if (builder->depth == DEPTH_MAX)
-        return report_error(builder->report, node.offset, "nested more than %d levels deep", DEPTH_MAX);
+        return report_error(builder->report, node.offset, "values may be nested at most %d levels deep",
+                            DEPTH_MAX);
     uint32_t index = (uint32_t)builder->tree->nodes.count;
     node_append(builder, node);
     builder->open[builder->depth++] = (OpenNode){.node = index};
@@ -118,12 +121,11 @@ static bool alias_append(TreeBuilder *builder, const char *name, size_t length, 
 {
     const Anchor *anchor = anchor_find(builder, name, length);
     if (!anchor)
-        return report_error(builder->report, offset, "unknown alias '*%.*s'",
-                            (int)(length < 40 ? length : 40), name);
-    for (size_t i = 0; i < builder->depth; i++) {
+        return report_error(builder->report, offset, "no anchor precedes the alias '*%.*s'",
+                            (int)(length < WORD_SHOWN ? length : WORD_SHOWN), name);
+    for (size_t i = 0; i < builder->depth; i++)
         if (builder->open[i].node == anchor->node)
-            return report_error(builder->report, offset, "recursive alias");
-    }
+            return report_error(builder->report, offset, "the alias is recursive");
     YamlNode copy = builder->tree->nodes.items[anchor->node];
     copy.next = 0;
     copy.offset -= (uint32_t)(builder->base + builder->gap); // which node_append adds
@@ -138,7 +140,7 @@ static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
     size_t start = fy_token_start_mark(token)->input_pos,
            length = fy_token_end_mark(token)->input_pos - start;
     if (builder->anchors.count == ANCHORS_MAX)
-        return report_error(builder->report, start, "more than %d anchors", ANCHORS_MAX);
+        return report_error(builder->report, start, "a file may have at most %d anchors", ANCHORS_MAX);
     Anchor anchor = {.text = start, .length = length, .node = (uint32_t)builder->tree->nodes.count};
     array_push(builder->anchors, anchor);
     return true;
@@ -172,14 +174,15 @@ static bool event_read(TreeBuilder *builder, struct fy_event *event)
     }
     if (is_node && fy_event_get_tag_token(event))
         return report_error(builder->report, fy_token_start_mark(fy_event_get_tag_token(event))->input_pos,
-                            "scenes have no tags");
+                            "a scene must not have tags");
     if (is_node && fy_event_get_anchor_token(event) && !anchor_add(builder, fy_event_get_anchor_token(event)))
         return false;
 
     switch (event->type) {
     case FYET_DOCUMENT_START:
         if (builder->tree->nodes.count > builder->root)
-            return report_error(builder->report, node.offset, "a second document");
+            return report_error(builder->report, node.offset,
+                                "there is a second document; only one is allowed");
         return true;
     case FYET_SCALAR:
         builder->value_end = builder->end;
@@ -227,7 +230,7 @@ static void syntax_report(struct fy_diag *diagnostics, Report *report, const Sou
     void *iterator = NULL;
     const struct fy_diag_error *error = fy_diag_errors_iterate(diagnostics, &iterator);
     if (!error) {
-        report_error(report, end, "not well-formed YAML");
+        report_error(report, end, not_well_formed);
         return;
     }
     report_error(report, place_offset(parsed, error->line, error->column), "%s", error->msg);
@@ -250,13 +253,13 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
             return false;
         }
         ended = event->type == FYET_STREAM_END;
-        bool taken = event_read(builder, event);
+        const bool is_read = event_read(builder, event);
         fy_parser_event_free(parser, event);
         if (builder->depth <= YAML_CUT_DEPTH) {
             stage_add(stage, builder->end - shown);
             shown = builder->end;
         }
-        if (!taken) return false;
+        if (!is_read) return false;
         if (cut && cut->is_passed && cut->gap == 0) return builder->anchors.count == 0;
     }
     if (cut) return cut->is_passed;

@@ -144,9 +144,8 @@ static bool part_parse(PartsReader *reader, size_t index, Text *text, YamlTree *
     const Source source = {.file = reader->source->file, .bytes = text->items, .length = text->count};
     Report report = report_open(&source, NULL);
     YamlCut cut = {.offset = key_length + item};
-    const bool is_read =
-        yaml_parse(part_tree, &report, reader->base + ends[0] - key_length, &source, &cut, reader->stage);
-    if (!is_read || cut.list != PART_LIST)
+    if (!yaml_parse(part_tree, &report, reader->base + ends[0] - key_length, &source, &cut, reader->stage) ||
+        cut.list != PART_LIST)
         return false; // the item after it may be in the list of a later key
     reader->parts[index] =
         (Part){.last = cut.last_before, .count = part_tree->nodes.items[cut.list].child_count};
@@ -159,11 +158,10 @@ static bool part_parse(PartsReader *reader, size_t index, Text *text, YamlTree *
 static void parts_parse(void *context, size_t begin, size_t end)
 {
     PartsReader *reader = context;
-    Text text = {0};
+    OwnedText text = {0};
     YamlTree part_tree = {0};
     for (size_t i = begin; i < end && !atomic_load(&reader->has_failed); i++)
         if (!part_parse(reader, i, &text, &part_tree)) atomic_store(&reader->has_failed, true);
-    text_free(&text);
     yaml_tree_free(&part_tree);
 }
 
@@ -189,14 +187,12 @@ static bool rest_parse(PartsReader *reader, YamlCut *cut)
     const size_t start = cuts->offsets.items[0], end = cuts->offsets.items[cuts->offsets.count - 1];
     if (memchr(source->bytes, '%', start)) return false; // it may be a directive that changes the syntax
     *cut = (YamlCut){.offset = start + cuts->indent + dash_length, .gap = end - start};
-    Text rest = {0};
+    OwnedText rest = {0};
     text_append(&rest, source->bytes, start);
     text_append(&rest, source->bytes + end, source->length - end);
     Report report = report_open(source, NULL);
     const Source parsed = {.bytes = rest.items, .length = rest.count};
-    const bool is_read = yaml_parse(reader->tree, &report, reader->base, &parsed, cut, reader->stage);
-    text_free(&rest);
-    return is_read;
+    return yaml_parse(reader->tree, &report, reader->base, &parsed, cut, reader->stage);
 }
 
 bool yaml_parts_read(YamlTree *tree, const Source *source, size_t base, size_t part_bytes, Stage *stage)

@@ -31,8 +31,8 @@ static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *n
         if (!read_number(reader, field, node, &scale->x)) return false;
         scale->y = scale->z = scale->x;
     }
-    if (scale->x != 0 && scale->y != 0 && scale->z != 0) return true;
-    return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
+    return (scale->x != 0 && scale->y != 0 && scale->z != 0) ||
+           report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
 }
 
 // Reads the angles about x, y and z, or an axis and an angle.
@@ -98,7 +98,7 @@ bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node
     } else {
         *affine = affine_identity;
         if (node->child_count > STEPS_MAX)
-            return report_error(&reader->report, node->offset, "'%s' has more than %d steps", field->name,
+            return report_error(&reader->report, node->offset, "'%s' may have at most %d steps", field->name,
                                 STEPS_MAX);
         for (const YamlNode *item = yaml_first(&reader->tree, node); item;
              item = yaml_next(&reader->tree, item)) {
@@ -108,6 +108,7 @@ bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node
         }
     }
     return has_inverse(affine) ||
-           report_error(&reader->report, node->offset, "'%s' must have an inverse, and numbers up to 1e30",
-                        field->name);
+           report_error(&reader->report, node->offset,
+                        "'%s' must have an inverse, and numbers of at most %g in magnitude", field->name,
+                        NUMBER_MAX);
 }

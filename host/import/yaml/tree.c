@@ -28,7 +28,8 @@ static bool source_is_text(const Source *source, Report *report)
         size = sizeof(uint64_t);
         if (source->length - at >= size && are_ascii(source->bytes + at)) continue;
         size = text_character_size(source->bytes + at, source->length - at);
-        if (!size || !source->bytes[at]) return report_error(report, at, "not UTF-8 text");
+        if (!size || !source->bytes[at])
+            return report_error(report, at, "the file must be UTF-8 text without NUL characters");
     }
     return true;
 }
@@ -61,7 +62,7 @@ static bool source_is_safe(const Source *source, Report *report)
             (at == start || is_blank(at[-1]) || !isascii(at[-1])) && (at + 1 == end || is_blank(at[1]));
         if (is_apart && may_begin_key(start, at))
             return report_error(report, (size_t)(at - start),
-                                "a '?' that begins a key in a text with tabs; replace the tabs by spaces");
+                                "a '?' begins a key in a text with tabs; replace the tabs by spaces");
     }
     return true;
 }
@@ -81,7 +82,7 @@ static void tree_reserve(YamlTree *tree, size_t length)
 static bool source_is_valid(const Source *source, Report *report, size_t base)
 {
     if (base > source_length_max || source->length > source_length_max - base)
-        return report_error(report, 0, "a scene of more than 2 GiB");
+        return report_error(report, 0, "a scene and its files may have at most 2 GiB");
     return source_is_text(source, report) && source_is_safe(source, report);
 }
 
@@ -98,14 +99,11 @@ bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage)
 bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start)
 {
     const Source *source = report->source;
-    Text blanked = {0}; // has the same offsets as the source
+    OwnedText blanked = {0}; // has the same offsets as the source
     text_append(&blanked, source->bytes, source->length);
     memset(blanked.items, ' ', start);
     const Source parsed = {.bytes = blanked.items, .length = blanked.count};
-    const bool is_read =
-        source_is_valid(&parsed, report, base) && yaml_parse(tree, report, base, &parsed, NULL, NULL);
-    text_free(&blanked);
-    return is_read;
+    return source_is_valid(&parsed, report, base) && yaml_parse(tree, report, base, &parsed, NULL, NULL);
 }
 
 void yaml_children_unshare(YamlTree *tree, uint32_t node)

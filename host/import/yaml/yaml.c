@@ -105,7 +105,7 @@ static bool read_include(YamlReader *reader, const Field *field, const YamlNode 
 {
     (void)target;
     return report_error(&reader->report, node->offset,
-                        "'%s' cannot be set: files are included before values are set", field->name);
+                        "'%s' cannot be set, because files are included before values are set", field->name);
 }
 
 static bool read_frames(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -150,7 +150,7 @@ static void document_read(YamlReader *reader)
     if (document.camera)
         yaml_read_camera(reader, document.camera);
     else if (!reader->options->camera && root->type == YAML_MAPPING)
-        report_error(&reader->report, root->offset, "scene lacks 'camera'");
+        report_error(&reader->report, root->offset, "the scene lacks 'camera'");
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
         yaml_read_materials(reader, document.materials);
