@@ -9,7 +9,7 @@
 #include <string.h>
 
 // Reads a count of the items that follow.
-static bool count_read(DatReader *reader, const char *name, unsigned *count)
+static bool item_count_read(DatReader *reader, const char *name, unsigned *count)
 {
     static const Range range_count = {0, INT32_MAX, false, "from 0 to 2147483647"};
     return line_whole_number(&reader->line, name, &range_count, count);
@@ -75,7 +75,7 @@ bool dat_polycylinder(DatReader *reader)
     unsigned count;
     double radius;
     OWNED ARRAY_OF(Vector3) points = {0};
-    if (!dat_expect(reader, "points") || !count_read(reader, "points", &count)) return false;
+    if (!dat_expect(reader, "points") || !item_count_read(reader, "points", &count)) return false;
     for (unsigned i = 0; i < count; i++) {
         Vector3 point;
         if (!dat_coordinates(reader, "points", &point)) return false;
@@ -100,7 +100,7 @@ bool dat_polycylinder(DatReader *reader)
     return true;
 }
 
-static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
+static void mesh_object_add(DatReader *reader, Mesh *mesh, uint32_t material)
 {
     const Object object = {
         .type = SHAPE_MESH, .material = material, .as.mesh.index = (uint32_t)reader->scene->meshes.count};
@@ -149,7 +149,7 @@ bool dat_ring(DatReader *reader)
     if (inner <= 0 || width <= 0) return object_end(reader, object, width, offset);
     if (!dat_texture(reader, &object.material)) return false;
     Mesh mesh = ring_mesh(center, normal, inner, outer);
-    mesh_add(reader, &mesh, object.material);
+    mesh_object_add(reader, &mesh, object.material);
     return true;
 }
 
@@ -164,14 +164,14 @@ bool dat_box(DatReader *reader)
     return object_end(reader, object, 1, offset);
 }
 
-static bool vertices_read(DatReader *reader, Object *object)
+static bool triangle_vertices_read(DatReader *reader, Object *object)
 {
     Vector3 *vertices = object->as.triangle.vertices;
     return dat_vector(reader, "v0", &vertices[0]) && dat_vector(reader, "v1", &vertices[1]) &&
            dat_vector(reader, "v2", &vertices[2]);
 }
 
-static bool normals_read(DatReader *reader, Object *object)
+static bool triangle_normals_read(DatReader *reader, Object *object)
 {
     Vector3 *normals = object->as.triangle.normals;
     if (!dat_vector(reader, "n0", &normals[0]) || !dat_vector(reader, "n1", &normals[1]) ||
@@ -185,13 +185,13 @@ static bool normals_read(DatReader *reader, Object *object)
 bool dat_triangle(DatReader *reader)
 {
     Object object = {.type = SHAPE_TRIANGLE};
-    return vertices_read(reader, &object) && object_end(reader, object, 1, 0);
+    return triangle_vertices_read(reader, &object) && object_end(reader, object, 1, 0);
 }
 
 bool dat_smooth_triangle(DatReader *reader)
 {
     Object object = {.type = SHAPE_TRIANGLE};
-    return vertices_read(reader, &object) && normals_read(reader, &object) &&
+    return triangle_vertices_read(reader, &object) && triangle_normals_read(reader, &object) &&
            object_end(reader, object, 1, 0);
 }
 
@@ -232,7 +232,7 @@ bool dat_colored_triangle(DatReader *reader)
     Color colors[3];
     Material material;
     Word texture;
-    if (!vertices_read(reader, &object) || !normals_read(reader, &object)) return false;
+    if (!triangle_vertices_read(reader, &object) || !triangle_normals_read(reader, &object)) return false;
     for (int i = 0; i < 3; i++)
         if (!dat_expect(reader, names[i]) || !line_vector(&reader->line, names[i], NULL, &colors[i]))
             return false;
@@ -258,7 +258,7 @@ typedef struct {
 } VertexArray;
 
 // Reads one vector per vertex. Reports an error and returns NULL on failure.
-static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count, bool are_colors)
+static Vector3 *array_vectors_read(DatReader *reader, const char *name, unsigned count, bool are_colors)
 {
     ARRAY_OF(Vector3) vectors = {0};
     array_reserve(vectors, 1);
@@ -294,13 +294,13 @@ static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
     const size_t offset = reader->line.start;
     const char *name = is_strip ? "tristrip" : "trimesh";
     unsigned count;
-    if (!count_read(reader, name, &count)) return false;
+    if (!item_count_read(reader, name, &count)) return false;
     uint32_t corners[3] = {0};
     const size_t index_count = (is_strip ? 1 : 3) * (size_t)count;
     for (size_t i = 0; i < index_count; i++) {
         unsigned index;
         const size_t index_offset = value_peek(&reader->line).offset;
-        if (!count_read(reader, name, &index)) return false;
+        if (!item_count_read(reader, name, &index)) return false;
         if (index >= array->mesh.vertex_count)
             return report_error(&reader->report, index_offset,
                                 "a triangle names vertex %u (counted from 0), but the array has only %zu",
@@ -322,20 +322,20 @@ static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
 static bool array_parts_read(DatReader *reader, VertexArray *array)
 {
     unsigned count;
-    if (!dat_expect(reader, "numverts") || !count_read(reader, "numverts", &count) ||
+    if (!dat_expect(reader, "numverts") || !item_count_read(reader, "numverts", &count) ||
         !dat_expect(reader, "coords"))
         return false;
     array->mesh.vertex_count = count;
-    array->mesh.vertices = vectors_read(reader, "coords", count, false);
+    array->mesh.vertices = array_vectors_read(reader, "coords", count, false);
     if (!array->mesh.vertices || !dat_expect(reader, "normals")) return false;
-    array->mesh.normals = vectors_read(reader, "normals", count, false);
+    array->mesh.normals = array_vectors_read(reader, "normals", count, false);
     if (!array->mesh.normals) return false;
     for (unsigned i = 0; i < count; i++)
         array->mesh.normals[i] = vector_normalize(array->mesh.normals[i]);
     while (!dat_skip(reader, "end_vertexarray")) {
         if (dat_skip(reader, "colors")) {
             free(array->colors);
-            array->colors = vectors_read(reader, "colors", count, true);
+            array->colors = array_vectors_read(reader, "colors", count, true);
             if (!array->colors) return false;
         } else if (dat_skip(reader, "texture")) {
             if (!texture_text_read(reader, &array->texture, &array->material)) return false;
@@ -361,7 +361,7 @@ bool dat_vertex_array(DatReader *reader)
     array.mesh.triangle_count = array.triangles.count;
     if (read && array.mesh.triangle_count > 0) {
         mesh_join_vertices(&array.mesh);
-        mesh_add(reader, &array.mesh, array.material_index);
+        mesh_object_add(reader, &array.mesh, array.material_index);
     } else {
         mesh_free(&array.mesh);
     }

@@ -27,7 +27,7 @@ typedef struct {
 } Texture;
 
 // Reads a number. Warns and keeps the default if the number is out of range.
-static bool factor_read(DatReader *reader, const char *name, const Range *range, double *factor)
+static bool texture_factor_read(DatReader *reader, const char *name, const Range *range, double *factor)
 {
     double number;
     const size_t offset = value_peek(&reader->line).offset;
@@ -39,7 +39,7 @@ static bool factor_read(DatReader *reader, const char *name, const Range *range,
     return true;
 }
 
-static bool color_read(DatReader *reader, Color *color)
+static bool texture_color_read(DatReader *reader, Color *color)
 {
     Color read;
     const size_t offset = value_peek(&reader->line).offset;
@@ -59,7 +59,7 @@ static bool phong_read(DatReader *reader, Texture *texture)
         dat_warn(reader, offset, "highlights have the light's color, not that of metal");
     else
         dat_skip(reader, "plastic");
-    return factor_read(reader, "phong", &range_not_negative, &texture->phong);
+    return texture_factor_read(reader, "phong", &range_not_negative, &texture->phong);
 }
 
 static bool transmode_read(DatReader *reader)
@@ -100,7 +100,7 @@ static bool function_read(DatReader *reader)
 
 // Converts a texture to a material. Tachyon's highlight is Blinn's, whose angle between the normal and the
 // halfway vector is half of Phong's, and cos(a / 2)^n is about cos(a)^(n / 4).
-static Material material_of(const DatReader *reader, const Texture *texture)
+static Material texture_material(const DatReader *reader, const Texture *texture)
 {
     Material material = dat_texture_default();
     material.color = texture->color;
@@ -116,7 +116,7 @@ static Material material_of(const DatReader *reader, const Texture *texture)
 }
 
 // Reads the value after a keyword. Reports an error and returns false if it is invalid.
-static bool key_read(DatReader *reader, Word word, Texture *texture)
+static bool texture_key_read(DatReader *reader, Word word, Texture *texture)
 {
     const struct {
         const char *name;
@@ -129,9 +129,9 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
                    {"phong_size", &range_not_negative, &texture->phong_size}};
     for (size_t i = 0; i < COUNT_OF(factors); i++)
         if (word_is_in_any_case(word, factors[i].name))
-            return factor_read(reader, factors[i].name, factors[i].range, factors[i].value);
+            return texture_factor_read(reader, factors[i].name, factors[i].range, factors[i].value);
     if (word_is_in_any_case(word, "phong")) return phong_read(reader, texture);
-    if (word_is_in_any_case(word, "color")) return color_read(reader, &texture->color);
+    if (word_is_in_any_case(word, "color")) return texture_color_read(reader, &texture->color);
     if (word_is_in_any_case(word, "transmode")) return transmode_read(reader);
     if (word_is_in_any_case(word, "outline")) return outline_read(reader, "outline");
     if (word_is_in_any_case(word, "outline_width")) return outline_read(reader, "outline_width");
@@ -144,10 +144,10 @@ bool dat_texture_body(DatReader *reader, Material *material)
     Texture texture = {.ambient = 0.1, .diffuse = 0.9, .opacity = 1, .phong_size = 100, .color = {1, 1, 1}};
     Word word = value_word(&reader->line);
     while (!word_is_in_any_case(word, "texfunc") && !word_is_in_any_case(word, "vcst")) {
-        if (!key_read(reader, word, &texture)) return false;
+        if (!texture_key_read(reader, word, &texture)) return false;
         word = value_word(&reader->line);
     }
-    *material = material_of(reader, &texture);
+    *material = texture_material(reader, &texture);
     return word_is_in_any_case(word, "vcst") || function_read(reader);
 }
 
@@ -156,7 +156,7 @@ typedef struct {
     uint32_t material; // of the scene
 } NamedTexture;
 
-static int names_compare(const void *a, const void *b)
+static int named_textures_compare(const void *a, const void *b)
 {
     const Word *first = &((const NamedTexture *)a)->name, *second = &((const NamedTexture *)b)->name;
     if (first->length != second->length) return first->length < second->length ? -1 : 1;
@@ -164,25 +164,25 @@ static int names_compare(const void *a, const void *b)
 }
 
 // Adds a texture, which replaces any earlier texture of the same name.
-static void texture_add(DatReader *reader, Word name, uint32_t material)
+static void named_texture_add(DatReader *reader, Word name, uint32_t material)
 {
     NamedTexture *added = memory_allocate(1, sizeof *added);
     *added = (NamedTexture){name, material};
-    NamedTexture **known = tsearch(added, &reader->textures, names_compare);
+    NamedTexture **known = tsearch(added, &reader->textures, named_textures_compare);
     if (!known) fault("out of memory: reading %s%s", reader->report.source->file, fault_limits());
     if (*known == added) return;
     (*known)->material = material;
     free(added);
 }
 
-static uint32_t texture_find(DatReader *reader, Word name)
+static uint32_t named_texture_find(DatReader *reader, Word name)
 {
-    NamedTexture **known = tfind(&(NamedTexture){.name = name}, &reader->textures, names_compare);
+    NamedTexture **known = tfind(&(NamedTexture){.name = name}, &reader->textures, named_textures_compare);
     if (known) return (*known)->material;
     dat_warn(reader, name.offset, "there is no texture '%.*s'; white is used", WORD_TEXT(name));
     const Material white = dat_texture_default();
     const uint32_t material = scene_add_material(reader->scene, &white, "");
-    texture_add(reader, name, material);
+    named_texture_add(reader, name, material);
     return material;
 }
 
@@ -191,7 +191,7 @@ bool dat_texture(DatReader *reader, uint32_t *material)
     const Word word = value_word(&reader->line);
     if (!word.length) return report_error(&reader->report, word.offset, "the object's texture is missing");
     if (!word_is_in_any_case(word, "texture")) {
-        *material = texture_find(reader, word);
+        *material = named_texture_find(reader, word);
         return true;
     }
     Material read;
@@ -206,13 +206,13 @@ bool dat_texture_definition(DatReader *reader)
     dat_skip(reader, "texture");
     Material material;
     if (!dat_texture_body(reader, &material)) return false;
-    texture_add(reader, name, scene_add_material(reader->scene, &material, ""));
+    named_texture_add(reader, name, scene_add_material(reader->scene, &material, ""));
     return true;
 }
 
 bool dat_texture_alias(DatReader *reader)
 {
     const Word name = value_word(&reader->line), other = value_word(&reader->line);
-    texture_add(reader, name, texture_find(reader, other));
+    named_texture_add(reader, name, named_texture_find(reader, other));
     return true;
 }

@@ -38,16 +38,16 @@ typedef struct {
     Vector3 from, at, up;
     double angle, hither; // glint has no near clipping plane
     unsigned size[2];
-} View;
+} NffView;
 
 // The first four are required.
 static const LineField view_keys[] = {
-    {"from", line_vector, offsetof(View, from), NULL},
-    {"at", line_vector, offsetof(View, at), NULL},
-    {"up", line_vector, offsetof(View, up), NULL},
-    {"angle", line_number, offsetof(View, angle), &range_half_turn},
-    {"hither", line_number, offsetof(View, hither), NULL},
-    {"resolution", size_read, offsetof(View, size), &range_pixels},
+    {"from", line_vector, offsetof(NffView, from), NULL},
+    {"at", line_vector, offsetof(NffView, at), NULL},
+    {"up", line_vector, offsetof(NffView, up), NULL},
+    {"angle", line_number, offsetof(NffView, angle), &range_half_turn},
+    {"hither", line_number, offsetof(NffView, hither), NULL},
+    {"resolution", size_read, offsetof(NffView, size), &range_pixels},
 };
 enum { VIEW_REQUIRED = 4, VIEW_KEYS = COUNT_OF(view_keys) };
 
@@ -65,7 +65,7 @@ static bool view_read(NffReader *reader)
     if (!line_is_first(&reader->line, &reader->has_view, "view")) return false;
     if (reader->scene->objects.count)
         return report_error(&reader->report, offset, "the view must precede the objects");
-    View view = {0};
+    NffView view = {0};
     bool seen[VIEW_KEYS] = {false};
     while (line_reach_word(&reader->line)) {
         const Word word = line_peek(&reader->line);

@@ -30,7 +30,7 @@ typedef struct {
     long exponent; // of ten
 } Decimal;
 
-static const char *digits_read(const char *at, const char *end, Decimal *decimal)
+static const char *decimal_digits_read(const char *at, const char *end, Decimal *decimal)
 {
     for (; at < end && (unsigned char)(*at - '0') < 10; at++, decimal->digit_count++)
         decimal->digits = 10 * decimal->digits + (uint64_t)(*at - '0');
@@ -78,10 +78,10 @@ NumberStatus number_scan(const char **text, const char *end, double *value)
     const char *at = *text;
     const bool is_negative = at < end && *at == '-';
     if (at < end && (*at == '-' || *at == '+')) at++;
-    at = digits_read(at, end, &decimal);
+    at = decimal_digits_read(at, end, &decimal);
     if (at < end && *at == '.') {
         const size_t whole_count = decimal.digit_count;
-        at = digits_read(at + 1, end, &decimal);
+        at = decimal_digits_read(at + 1, end, &decimal);
         decimal.exponent = -(long)(decimal.digit_count - whole_count);
     }
     if (decimal.digit_count == 0 || at - *text > NUMBER_LENGTH_MAX) return NUMBER_MALFORMED;

@@ -60,7 +60,7 @@ static void normals_of_heights(Image *image)
     image->channels = 3;
 }
 
-static bool texture_read(SceneTexture *texture, uint32_t max_pixels, MessageList *messages)
+static bool scene_texture_read(SceneTexture *texture, uint32_t max_pixels, MessageList *messages)
 {
     const ImageReadOptions options = {.layer = texture->layer, .max_pixels = max_pixels};
     const Text *bytes = &texture->bytes;
@@ -97,7 +97,7 @@ static char *image_problem(const Image *image, size_t texel_count)
 static bool texture_decode(SceneTexture *texture, size_t *texel_count, uint32_t max_pixels, Report *report)
 {
     OwnedMessageList problems = {0};
-    const bool is_read = texture->image.values || texture_read(texture, max_pixels, &problems);
+    const bool is_read = texture->image.values || scene_texture_read(texture, max_pixels, &problems);
     for (size_t i = 0; i < problems.count; i++)
         report_message(report, problems.items[i].severity, texture->offset, "%s", problems.items[i].text);
     text_free(&texture->bytes);

@@ -93,7 +93,7 @@ static const struct aiTexture *embedded_texture(const struct aiScene *file, cons
     return NULL;
 }
 
-static uint32_t texture_add(const Importer *importer, const char *name, const char *owner)
+static uint32_t assimp_texture_add(const Importer *importer, const char *name, const char *owner)
 {
     MeshDraft *draft = importer->draft;
     const struct aiTexture *embedded = embedded_texture(importer->file, name);
@@ -140,11 +140,11 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
     if (to->uv_set >= AI_MAX_NUMBER_OF_TEXTURECOORDS) to->uv_set = 0;
     wraps[0] = wrap_of(modes[0]);
     wraps[1] = wrap_of(modes[1]);
-    to->texture = texture_add(importer, path.data, name);
+    to->texture = assimp_texture_add(importer, path.data, name);
 }
 
 // Converts a material. Keeps only its specular strength, because glint's highlights have the light's color.
-static Material material_of(const Importer *importer)
+static Material material_convert(const Importer *importer)
 {
     Material material = material_default();
     const Color specular = color_of(importer, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
@@ -173,7 +173,7 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     TextureWrap wraps[2] = {TEXTURE_REPEATED, TEXTURE_REPEATED};
     // assimp's default where the file has none
     if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) {
-        material = material_of(importer);
+        material = material_convert(importer);
         textures_read(importer, from, name.data, to, wraps);
     } else if (importer->draft->import->view) {
         material.ambient = 0;
@@ -189,7 +189,7 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     to->scene_index[1] = scene_add_material(scene, &material, name.data);
 }
 
-static ImportedMaterial *material_use(Importer *importer, unsigned index)
+static ImportedMaterial *imported_material(Importer *importer, unsigned index)
 {
     ImportedMaterial *material = &importer->materials[index];
     if (material->scene_index[0] == DRAFT_NONE)
@@ -197,8 +197,8 @@ static ImportedMaterial *material_use(Importer *importer, unsigned index)
     return material;
 }
 
-static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine,
-                         const ImportedMaterial *material)
+static void assimp_vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affine *affine,
+                                const ImportedMaterial *material)
 {
     const Affine for_normals = affine_for_normals(affine);
     const struct aiVector3D *uvs = from->mTextureCoords[material ? material->uv_set : 0];
@@ -227,8 +227,8 @@ static bool face_has_area(const struct aiMesh *mesh, const struct aiFace *face)
     return triangle_has_area(a, b, c);
 }
 
-static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face, size_t first,
-                     bool mirrored)
+static bool assimp_face_add(MeshDraft *draft, const struct aiMesh *from, const struct aiFace *face,
+                            size_t first, bool mirrored)
 {
     const unsigned count = face->mNumIndices;
     for (unsigned i = 0; i < count; i++)
@@ -243,7 +243,7 @@ static bool face_add(MeshDraft *draft, const struct aiMesh *from, const struct a
     return draft_end_face(draft, 0);
 }
 
-static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine *affine)
+static bool assimp_mesh_add(Importer *importer, const struct aiMesh *from, const Affine *affine)
 {
     MeshDraft *draft = importer->draft;
     const size_t first = draft->positions.count;
@@ -252,7 +252,7 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
         return draft_refuse(draft, "a mesh names material %u (counted from 0), but the file has only %u",
                             from->mMaterialIndex, importer->file->mNumMaterials);
     const ImportedMaterial *material =
-        importer->materials ? material_use(importer, from->mMaterialIndex) : NULL;
+        importer->materials ? imported_material(importer, from->mMaterialIndex) : NULL;
     if (material) {
         const bool is_textured = material->texture > 0 && from->mTextureCoords[material->uv_set];
         if (material->texture > 0 && !is_textured) draft_warn(importer->draft, "%s", draft_no_uvs);
@@ -262,15 +262,15 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     if (from->mNumBones > 0) draft_warn(importer->draft, "%s", draft_skins);
     if (from->mNumAnimMeshes > 0) draft_warn(importer->draft, "%s", draft_morphs);
     if (from->mColors[0]) draft_warn(importer->draft, "%s", draft_colors);
-    vertices_add(draft, from, affine, material);
+    assimp_vertices_add(draft, from, affine, material);
     const bool mirrored = affine_determinant(affine) < 0;
     for (unsigned i = 0; i < from->mNumFaces; i++)
-        if (!face_add(draft, from, &from->mFaces[i], first, mirrored)) return false;
+        if (!assimp_face_add(draft, from, &from->mFaces[i], first, mirrored)) return false;
     return true;
 }
 
 // Adds the cameras and lights that have the node's name. They lie in the node's space.
-static void view_add(Importer *importer, const struct aiNode *node, const Affine *affine)
+static void assimp_view_add(Importer *importer, const struct aiNode *node, const Affine *affine)
 {
     const struct aiScene *file = importer->file;
     MeshView *view = importer->draft->import->view;
@@ -316,20 +316,20 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
     }
 }
 
-static bool node_add(Importer *importer, const struct aiNode *node, const Affine *parent)
+static bool assimp_node_add(Importer *importer, const struct aiNode *node, const Affine *parent)
 {
     const Affine local = affine_of_node(&node->mTransformation), affine = affine_multiply(parent, &local);
-    view_add(importer, node, &affine);
+    assimp_view_add(importer, node, &affine);
     for (unsigned i = 0; i < node->mNumMeshes; i++)
         if (node->mMeshes[i] < importer->file->mNumMeshes &&
-            !mesh_add(importer, importer->file->mMeshes[node->mMeshes[i]], &affine))
+            !assimp_mesh_add(importer, importer->file->mMeshes[node->mMeshes[i]], &affine))
             return false;
     for (unsigned i = 0; i < node->mNumChildren; i++)
-        if (!node_add(importer, node->mChildren[i], &affine)) return false;
+        if (!assimp_node_add(importer, node->mChildren[i], &affine)) return false;
     return true;
 }
 
-static bool file_add(Importer *importer)
+static bool assimp_file_add(Importer *importer)
 {
     const size_t material_count = importer->file->mNumMaterials;
     if (importer->draft->import->own_materials) {
@@ -341,7 +341,7 @@ static bool file_add(Importer *importer)
     if (!importer->draft->import->view && importer->file->mNumCameras + importer->file->mNumLights > 0)
         draft_warn(importer->draft, "%s", draft_view);
     const bool added =
-        !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &affine_identity);
+        !importer->file->mRootNode || assimp_node_add(importer, importer->file->mRootNode, &affine_identity);
     free(importer->materials);
     draft_fill_parts(importer->draft);
     return added;
@@ -365,7 +365,7 @@ bool assimp_read(MeshDraft *draft)
         if (strstr(error, "bad_alloc")) exit(EXIT_MACHINE);
         return draft_refuse(draft, "%.*s", (int)strcspn(error, "\r\n"), error);
     }
-    const bool added = file_add(&importer);
+    const bool added = assimp_file_add(&importer);
     aiReleaseImport(importer.file);
     return added;
 }

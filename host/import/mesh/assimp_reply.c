@@ -155,7 +155,7 @@ static bool arrays_read(const ReplyArrays *arrays, FILE *reply, const uint64_t c
 }
 
 // Reads the header and the arrays. Returns false if the reply is incomplete.
-static bool reply_read(MeshDraft *draft, FILE *reply, ReplyHeader *header, ReplyLists *lists)
+static bool mesh_reply_read(MeshDraft *draft, FILE *reply, ReplyHeader *header, ReplyLists *lists)
 {
     char end[sizeof magic];
     const ReplyArrays arrays = arrays_of(draft, lists);
@@ -240,7 +240,7 @@ static bool materials_add(MeshDraft *draft, const ReplyLists *lists, const uint3
 }
 
 // Copies the members of the camera and the lights that assimp_read sets, whose values mesh_scene.c checks.
-static bool view_add(MeshDraft *draft, const ReplyLists *lists, const ReplyHeader *header)
+static bool reply_view_add(MeshDraft *draft, const ReplyLists *lists, const ReplyHeader *header)
 {
     MeshView *view = draft->import->view;
     if (!view) return lists->lights.count == 0 && !header->has_camera;
@@ -312,10 +312,11 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
     ReplyHeader header;
     ReplyLists lists = {0};
     uint32_t textures[SCENE_TEXTURES_MAX];
-    bool is_sound = reply_read(draft, reply, &header, &lists) && header.warning_count <= UINT32_MAX;
+    bool is_sound = mesh_reply_read(draft, reply, &header, &lists) && header.warning_count <= UINT32_MAX;
     if (is_sound) messages_add(draft, &lists, header.warning_count);
     is_sound = is_sound && textures_add(draft, &lists, textures) && materials_add(draft, &lists, textures) &&
-               view_add(draft, &lists, &header) && draft_is_sound(draft, &header, lists.materials.count);
+               reply_view_add(draft, &lists, &header) &&
+               draft_is_sound(draft, &header, lists.materials.count);
     lists_free(&lists);
     if (is_sound) *read = header.is_read != 0;
     return is_sound;

@@ -237,7 +237,7 @@ static bool asset_check(Gltf *gltf)
            gltf_fails(gltf, &needed, "is '%.20s'; glint reads glTF 2.0", version);
 }
 
-static bool json_read(Gltf *gltf, const char *text, size_t length, size_t offset)
+static bool json_text_read(Gltf *gltf, const char *text, size_t length, size_t offset)
 {
     json_error_t error;
     if (length > JSON_BYTES_MAX)
@@ -269,7 +269,7 @@ static bool glb_read(Gltf *gltf, const Source *source)
             return draft_fails(draft, at, "the file ends within a chunk of %zu bytes", length);
         const char *bytes = source->bytes + at + CHUNK_BYTES;
         if (i == 0 && type != CHUNK_JSON) return draft_fails(draft, at + 4, "the first chunk must be JSON");
-        if (i == 0 && !json_read(gltf, bytes, length, at + CHUNK_BYTES)) return false;
+        if (i == 0 && !json_text_read(gltf, bytes, length, at + CHUNK_BYTES)) return false;
         if (i == 1 && type == CHUNK_BINARY) gltf->binary = (GltfBuffer){.bytes = bytes, .length = length};
         at += CHUNK_BYTES + length;
     }
@@ -307,7 +307,7 @@ bool gltf_read(MeshDraft *draft)
     const bool is_binary = source->length >= 4 && memcmp(source->bytes, "glTF", 4) == 0;
     const size_t mark = source->length >= 3 && memcmp(source->bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
     bool read = is_binary ? glb_read(&gltf, source)
-                          : json_read(&gltf, source->bytes + mark, source->length - mark, mark);
+                          : json_text_read(&gltf, source->bytes + mark, source->length - mark, mark);
     if (read) {
         gltf_open(&gltf);
         const GltfItem root = gltf_root(&gltf), animations = gltf_member(&root, "animations");

@@ -87,7 +87,7 @@ static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri
            gltf_fails(gltf, uri, "names an unreadable file; %s", problems.items[0].text);
 }
 
-static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bool is_first)
+static bool gltf_buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bool is_first)
 {
     const GltfItem uri = gltf_string(gltf, item, "uri");
     const char *text = json_string_value(uri.json);
@@ -117,7 +117,7 @@ static const GltfBuffer *buffer_open(Gltf *gltf, size_t index)
     GltfBuffer *buffer = &gltf->buffers[index], read = {0};
     const GltfItem item = gltf_entry(gltf, "buffers", index);
     if (buffer->bytes) return buffer;
-    if (buffer_read(gltf, &item, &read, index == 0)) {
+    if (gltf_buffer_read(gltf, &item, &read, index == 0)) {
         *buffer = read;
         return buffer;
     }
@@ -212,7 +212,7 @@ static bool elements_find(Gltf *gltf, const GltfItem *item, Elements *elements)
     return true;
 }
 
-static void element_read(const Elements *elements, size_t row, double *values)
+static void accessor_element_read(const Elements *elements, size_t row, double *values)
 {
     const char *bytes = elements->bytes + row * elements->stride;
     const size_t size = component_size(elements->type);
@@ -242,12 +242,12 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
         return false;
     for (size_t i = 0; i < of_indices.count; i++) {
         double row = 0;
-        element_read(&of_indices, i, &row);
+        accessor_element_read(&of_indices, i, &row);
         if (!(row >= 0 && row < (double)elements->count))
             return gltf_fails(gltf, &indices,
                               "names element %.0f (counted from 0) in row %zu, but the accessor has only %zu",
                               row, i, elements->count);
-        element_read(&of_values, i, numbers->items + (size_t)row * numbers->width);
+        accessor_element_read(&of_values, i, numbers->items + (size_t)row * numbers->width);
     }
     return true;
 }
@@ -288,6 +288,6 @@ bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_
     numbers->count = elements.count;
     numbers->items = memory_allocate_zeroed(elements.count, width * sizeof *numbers->items);
     for (size_t i = 0; i < elements.count && elements.bytes; i++)
-        element_read(&elements, i, numbers->items + i * width);
+        accessor_element_read(&elements, i, numbers->items + i * width);
     return sparse_read(gltf, &accessor, &elements, numbers);
 }

@@ -79,7 +79,7 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
 }
 
 // Adds the image to the scene's textures. Returns 0 with a warning if it cannot be used.
-static uint32_t image_add(Gltf *gltf, const GltfItem *image, TextureContent content)
+static uint32_t gltf_image_add(Gltf *gltf, const GltfItem *image, TextureContent content)
 {
     MeshDraft *draft = gltf->draft;
     const GltfItem uri = gltf_string(gltf, image, "uri");
@@ -146,7 +146,7 @@ static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *pla
 }
 
 // Sets the texture that a material names if it can be used.
-static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent content, GltfTexture *place)
+static void gltf_texture_read(Gltf *gltf, const GltfItem *info, TextureContent content, GltfTexture *place)
 {
     size_t index = SIZE_MAX, source = SIZE_MAX;
     if (!info->json || !gltf_index(gltf, info, "index", "textures", &index) || index == SIZE_MAX) return;
@@ -161,11 +161,11 @@ static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent conten
     sampler_read(gltf, &texture, place);
     const GltfItem image = gltf_entry(gltf, "images", source);
     uint32_t *known = &gltf->images[2 * source + (content == TEXTURE_NORMALS)];
-    if (*known == DRAFT_NONE) *known = image_add(gltf, &image, content);
+    if (*known == DRAFT_NONE) *known = gltf_image_add(gltf, &image, content);
     place->number = *known;
 }
 
-static double mean_of(const double color[3])
+static double channels_mean(const double color[3])
 {
     return (color[0] + color[1] + color[2]) / 3;
 }
@@ -222,9 +222,10 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
     const Color emission = {surface->emissive[0] * strength, surface->emissive[1] * strength,
                             surface->emissive[2] * strength};
     look->ambient = gltf->draft->import->view ? 0 : look->diffuse.x;
-    material->textured_ambient = look->ambient * mean_of(base);
+    material->textured_ambient = look->ambient * channels_mean(base);
     if (surface->is_unlit) {
-        if (material->texture.number > 0 && !texture_can_emit(gltf, item, material, mean_of(base))) return;
+        if (material->texture.number > 0 && !texture_can_emit(gltf, item, material, channels_mean(base)))
+            return;
         if (material->texture.number > 0 && (base[0] != base[1] || base[1] != base[2]))
             gltf_warn_once(gltf, item, unlit_tint);
         look->emission = look->color;
@@ -240,12 +241,12 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
         look->emission = emission;
         return;
     }
-    if (!base_color && mean_of(base) == 0)
-        texture_read(gltf, &surface->emissive_texture, TEXTURE_COLORS, &material->texture);
+    if (!base_color && channels_mean(base) == 0)
+        gltf_texture_read(gltf, &surface->emissive_texture, TEXTURE_COLORS, &material->texture);
     if (material->texture.number == 0 || (base_color && !json_equal(emissive, base_color))) {
         gltf_warn_once(gltf, item, "emission next to a different texture is not shown");
     } else if (texture_can_emit(gltf, item, material,
-                                mean_of((double[]){emission.x, emission.y, emission.z}))) {
+                                channels_mean((double[]){emission.x, emission.y, emission.z}))) {
         look->emission = emission;
         if (!vector_is_zero(color_tint(emission))) gltf_warn_once(gltf, item, unlit_tint);
     }
@@ -311,7 +312,7 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
     const GltfItem info = gltf_object(gltf, item, "normalTexture");
     GltfTexture *normals = &material->normals, *color = &material->texture;
     Material *look = &material->look;
-    texture_read(gltf, &info, TEXTURE_NORMALS, normals);
+    gltf_texture_read(gltf, &info, TEXTURE_NORMALS, normals);
     if (normals->number == 0) return;
     if (color->number == 0) {
         *color = *normals;
@@ -334,7 +335,7 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
     gltf_numbers(gltf, &info, "scale", 1, &look->normal_map.strength);
 }
 
-static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
+static void gltf_material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
 {
     GltfSurface surface;
     gltf->is_optional = true;
@@ -349,7 +350,7 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
     look->image.ignores_alpha = true; // alphaMode decides
     for (int i = 0; i < 4; i++)
         surface.base[i] = fmax(surface.base[i], 0);
-    texture_read(gltf, &surface.base_texture, TEXTURE_COLORS, &material->texture);
+    gltf_texture_read(gltf, &surface.base_texture, TEXTURE_COLORS, &material->texture);
     look->color = (Color){surface.base[0], surface.base[1], surface.base[2]};
     gloss_set(gltf, item, &surface, look);
     emission_set(gltf, item, &surface, material);
@@ -366,7 +367,7 @@ GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive)
     gltf_index(gltf, primitive, "material", "materials", &index);
     GltfMaterial *material = &gltf->materials[index];
     const GltfItem item = gltf_entry(gltf, "materials", index);
-    if (!material->is_read) material_read(gltf, &item, material);
+    if (!material->is_read) gltf_material_read(gltf, &item, material);
     gltf->is_optional = false;
     return material;
 }

@@ -53,7 +53,7 @@ static void vertices_free(Vertices *vertices)
     free(vertices->indices.items);
 }
 
-static Vector3 vector_at(const GltfNumbers *numbers, size_t row)
+static Vector3 numbers_vector(const GltfNumbers *numbers, size_t row)
 {
     const double *values = numbers->items + 3 * row;
     return (Vector3){values[0], values[1], values[2]};
@@ -72,8 +72,8 @@ static void attribute_read(Gltf *gltf, const GltfItem *attributes, const char *k
     if (!read || numbers->count != positions->count) numbers->count = 0;
 }
 
-static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMaterial *material,
-                          Vertices *vertices)
+static bool primitive_vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMaterial *material,
+                                    Vertices *vertices)
 {
     const GltfItem attributes = gltf_object(gltf, primitive, "attributes");
     *vertices = (Vertices){.first = gltf->draft->positions.count};
@@ -96,8 +96,8 @@ static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMater
 }
 
 // Adds the vertices, transformed to the world. v points downward in glTF and upward in glint.
-static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfMaterial *material,
-                         const Affine *affine)
+static void primitive_vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfMaterial *material,
+                                   const Affine *affine)
 {
     static const double plain[2][3] = {{1, 0, 0}, {0, 1, 0}};
     const double(*rows)[3] = material ? material->texture.uv_rows : plain;
@@ -105,9 +105,9 @@ static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfM
     if (vertices->normals.count > 0) draft_share_part(draft, DRAFT_NORMAL);
     if (vertices->uvs.count > 0) draft_share_part(draft, DRAFT_UV);
     for (size_t i = 0; i < vertices->positions.count; i++)
-        array_push(draft->positions, affine_point(affine, vector_at(&vertices->positions, i)));
+        array_push(draft->positions, affine_point(affine, numbers_vector(&vertices->positions, i)));
     for (size_t i = 0; i < vertices->normals.count; i++) {
-        const Vector3 normal = affine_direction(&for_normals, vector_at(&vertices->normals, i));
+        const Vector3 normal = affine_direction(&for_normals, numbers_vector(&vertices->normals, i));
         array_push(draft->normals, vector_normalize(normal));
     }
     for (size_t i = 0; i < vertices->uvs.count; i++) {
@@ -125,8 +125,9 @@ static void triangle_add(MeshDraft *draft, const Vertices *vertices, size_t a, s
     for (int i = 0; i < 3 && vertices->indices.count > 0; i++)
         corners[i] = (size_t)vertices->indices.items[corners[i]];
     const GltfNumbers *positions = &vertices->positions;
-    const bool has_area = triangle_has_area(
-        vector_at(positions, corners[0]), vector_at(positions, corners[1]), vector_at(positions, corners[2]));
+    const bool has_area =
+        triangle_has_area(numbers_vector(positions, corners[0]), numbers_vector(positions, corners[1]),
+                          numbers_vector(positions, corners[2]));
     for (int i = 0; i < 3; i++)
         array_push(draft->corners[DRAFT_POSITION], (uint32_t)(vertices->first + corners[has_area ? i : 0]));
     draft_end_face(draft, 0);
@@ -145,7 +146,7 @@ static void triangles_add(Gltf *gltf, const GltfItem *primitive, const Vertices 
     }
 }
 
-static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *affine)
+static bool gltf_primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *affine)
 {
     MeshDraft *draft = gltf->draft;
     size_t mode = MODE_TRIANGLES;
@@ -162,7 +163,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     if (targets.json) gltf_warn_once(gltf, &targets, draft_morphs);
     GltfMaterial *material = draft->import->own_materials ? gltf_material(gltf, primitive) : NULL;
     Vertices vertices;
-    const bool read = vertices_read(gltf, primitive, material, &vertices);
+    const bool read = primitive_vertices_read(gltf, primitive, material, &vertices);
     if (read && material) {
         const bool has_texture = material->texture.number > 0 || material->normals.number > 0,
                    has_uvs = vertices.uvs.count > 0;
@@ -172,7 +173,7 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     }
     if (read) {
         vertices.is_mirrored = affine_determinant(affine) < 0;
-        vertices_add(draft, &vertices, material, affine);
+        primitive_vertices_add(draft, &vertices, material, affine);
         triangles_add(gltf, primitive, &vertices, mode);
     }
     vertices_free(&vertices);
@@ -255,7 +256,7 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
 }
 
 // Adds the node's camera and light, or warns about them if the file is a mesh of another scene.
-static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
+static void gltf_view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
 {
     gltf->is_optional = true;
     const GltfItem extension = gltf_extension(gltf, node, "KHR_lights_punctual"), root = gltf_root(gltf),
@@ -279,7 +280,7 @@ static void view_add(Gltf *gltf, const GltfItem *node, const Affine *affine)
     gltf->is_optional = false;
 }
 
-static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned depth)
+static bool gltf_node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned depth)
 {
     const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_array(gltf, &node, "children"),
                    skin = gltf_member(&node, "skin");
@@ -290,19 +291,19 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     if (!transform_read(gltf, &node, &local)) return false;
     affine = affine_multiply(parent, &local);
     if (skin.json) gltf_warn_once(gltf, &skin, draft_skins);
-    view_add(gltf, &node, &affine);
+    gltf_view_add(gltf, &node, &affine);
     size_t mesh_index = SIZE_MAX;
     if (!gltf_index(gltf, &node, "mesh", "meshes", &mesh_index)) return false;
     const GltfItem mesh = gltf_entry(gltf, "meshes", mesh_index),
                    primitives = gltf_array(gltf, &mesh, "primitives");
     for (size_t i = 0; i < json_array_size(primitives.json); i++) {
         const GltfItem primitive = gltf_element(gltf, &primitives, i);
-        if (!primitive_add(gltf, &primitive, &affine)) return false;
+        if (!gltf_primitive_add(gltf, &primitive, &affine)) return false;
     }
     for (size_t i = 0; i < json_array_size(children.json); i++) {
         size_t child;
         if (!gltf_element_index(gltf, &children, i, "nodes", &child) ||
-            !node_add(gltf, child, &affine, depth + 1))
+            !gltf_node_add(gltf, child, &affine, depth + 1))
             return false;
     }
     return true;
@@ -322,7 +323,7 @@ static bool roots_add(Gltf *gltf, const Affine *affine)
         }
     }
     for (size_t i = 0; i < count; i++)
-        if (!is_child[i] && !node_add(gltf, i, affine, 0)) return false;
+        if (!is_child[i] && !gltf_node_add(gltf, i, affine, 0)) return false;
     return true;
 }
 
@@ -340,7 +341,7 @@ bool gltf_scene_read(Gltf *gltf)
         for (size_t i = 0; i < json_array_size(nodes.json); i++) {
             size_t node;
             if (!gltf_element_index(gltf, &nodes, i, "nodes", &node) ||
-                !node_add(gltf, node, &affine_identity, 0))
+                !gltf_node_add(gltf, node, &affine_identity, 0))
                 return false;
         }
     }

@@ -29,7 +29,7 @@ bool mesh_is_known(const char *path)
 }
 
 // Reads the file, and frees its text before the draft becomes a mesh, which also needs memory.
-static bool file_read(MeshDraft *draft, Mesh *mesh)
+static bool mesh_file_read(MeshDraft *draft, Mesh *mesh)
 {
     bool (*read)(MeshDraft *) = reader_of(draft->import->path);
     OwnedText text = {0};
@@ -91,7 +91,7 @@ bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index)
     stage_begin(draft.stage, "reading", import->path, 0);
     draft.report = report_open(&draft.source, &messages);
     Mesh mesh = {0};
-    const bool read = file_read(&draft, &mesh) && copies_fit(&draft, &mesh);
+    const bool read = mesh_file_read(&draft, &mesh) && copies_fit(&draft, &mesh);
     if (read) {
         mesh_join_vertices(&mesh);
         if (import->smoothing == SMOOTH_ALWAYS && !mesh.normals) mesh_make_normals(&mesh);

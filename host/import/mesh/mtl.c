@@ -51,7 +51,7 @@ typedef struct {
 } MtlReader;
 
 // Returns the material that the file's lines describe, or NULL before the first one.
-static MtlMaterial *material_of(MtlReader *reader)
+static MtlMaterial *current_material(MtlReader *reader)
 {
     return reader->materials.count > reader->first_material
                ? &reader->materials.items[reader->materials.count - 1]
@@ -122,7 +122,7 @@ struct Statement {
     TextureContent content; // of an image
 };
 
-static bool factor_read(MtlReader *reader, const Statement *statement, void *target)
+static bool mtl_factor_read(MtlReader *reader, const Statement *statement, void *target)
 {
     const Range *range = statement->range;
     double number;
@@ -145,7 +145,7 @@ static bool placed_factor_read(MtlReader *reader, const Statement *statement, vo
 {
     MtlNumber *number = target;
     number->offset = line_word_offset(&reader->line);
-    return factor_read(reader, statement, &number->value);
+    return mtl_factor_read(reader, statement, &number->value);
 }
 
 static bool dissolve_read(MtlReader *reader, const Statement *statement, void *target)
@@ -158,16 +158,16 @@ static bool dissolve_read(MtlReader *reader, const Statement *statement, void *t
         unused_record(&reader->unused, &reader->report, word, unsupported);
         reader->line = ahead;
     }
-    return factor_read(reader, statement, &number->value);
+    return mtl_factor_read(reader, statement, &number->value);
 }
 
 // Reads a color from three numbers, or from one for all channels.
-static bool color_read(MtlReader *reader, const Statement *statement, void *target)
+static bool mtl_color_read(MtlReader *reader, const Statement *statement, void *target)
 {
     double numbers[3];
     int count = 0;
     do
-        if (!factor_read(reader, statement, &numbers[count])) return false;
+        if (!mtl_factor_read(reader, statement, &numbers[count])) return false;
     while (++count < 3 && line_has_word(&reader->line));
     if (count == 1) numbers[1] = numbers[0];
     if (count < 3) numbers[2] = numbers[1];
@@ -179,7 +179,7 @@ static bool color_read(MtlReader *reader, const Statement *statement, void *targ
 static bool strength_read(MtlReader *reader, const Statement *statement, void *target)
 {
     Color color;
-    if (!color_read(reader, statement, &color)) return false;
+    if (!mtl_color_read(reader, statement, &color)) return false;
     *(double *)target = vector_mean(color);
     return true;
 }
@@ -201,7 +201,7 @@ static bool texture_option_read(Line *line, double *multiplier, bool *is_used)
 }
 
 // Reads the name of an image.
-static bool texture_read(MtlReader *reader, const Statement *statement, void *target)
+static bool mtl_texture_read(MtlReader *reader, const Statement *statement, void *target)
 {
     MtlImage *image = target;
     const bool has_normals = statement->content == TEXTURE_NORMALS || statement->content == TEXTURE_BUMPS;
@@ -232,28 +232,28 @@ static const Range range_illumination = {0, 10, false, "from 0 to 10"};
 #define LOOK(member) offsetof(MtlMaterial, material.member)
 
 static const Statement statements[] = {
-    {"Kd", color_read, LOOK(color), &range_not_negative},
+    {"Kd", mtl_color_read, LOOK(color), &range_not_negative},
     {"Ks", strength_read, LOOK(specular.largest), &range_not_negative},
-    {"Ns", factor_read, LOOK(shininess), &range_not_negative},
-    {"Ni", factor_read, LOOK(ior), &range_positive},
+    {"Ns", mtl_factor_read, LOOK(shininess), &range_not_negative},
+    {"Ni", mtl_factor_read, LOOK(ior), &range_positive},
     {"Tr", placed_factor_read, offsetof(MtlMaterial, transparency), &range_unit},
     {"d", dissolve_read, offsetof(MtlMaterial, dissolve), &range_unit},
     {"Ka"},
     {"illum", placed_factor_read, offsetof(MtlMaterial, illumination), &range_illumination},
-    {"Ke", color_read, LOOK(emission), &range_not_negative},
-    {"Tf", color_read, offsetof(MtlMaterial, filter), &range_not_negative},
-    {"map_Kd", texture_read, offsetof(MtlMaterial, color_image), NULL, TEXTURE_COLORS},
-    {"map_d", texture_read, offsetof(MtlMaterial, opacity_image), NULL, TEXTURE_OPACITY},
-    {"norm", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_NORMALS},
-    {"map_Bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
-    {"map_bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
-    {"bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
+    {"Ke", mtl_color_read, LOOK(emission), &range_not_negative},
+    {"Tf", mtl_color_read, offsetof(MtlMaterial, filter), &range_not_negative},
+    {"map_Kd", mtl_texture_read, offsetof(MtlMaterial, color_image), NULL, TEXTURE_COLORS},
+    {"map_d", mtl_texture_read, offsetof(MtlMaterial, opacity_image), NULL, TEXTURE_OPACITY},
+    {"norm", mtl_texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_NORMALS},
+    {"map_Bump", mtl_texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
+    {"map_bump", mtl_texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
+    {"bump", mtl_texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
 };
 
-static void line_read(MtlReader *reader)
+static void mtl_line_read(MtlReader *reader)
 {
     const Word word = line_word(&reader->line);
-    MtlMaterial *material = material_of(reader);
+    MtlMaterial *material = current_material(reader);
     if (word.length == 0) return;
     if (word_is(word, "newmtl")) {
         if (material) material_end(reader, material);
@@ -332,9 +332,9 @@ static bool library_read(MtlReader *reader, const char *path)
     reader->first_material = reader->materials.count;
     if (line_is_text(&reader->line)) {
         do
-            line_read(reader);
+            mtl_line_read(reader);
         while (line_next(&reader->line));
-        MtlMaterial *last = material_of(reader);
+        MtlMaterial *last = current_material(reader);
         if (last) material_end(reader, last);
         materials_sort(reader);
     }
@@ -388,7 +388,7 @@ static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
 }
 
 // Adds an image to the scene. Returns 0 if there is none, or with a warning if it cannot be used.
-static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const MtlImage *image)
+static uint32_t mtl_image_add(MeshDraft *draft, const MtlMaterial *material, const MtlImage *image)
 {
     if (!image->path) return 0;
     if (!draft_has(draft, DRAFT_UV)) {
@@ -408,20 +408,20 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
     const MtlImage *opacity = &material->opacity_image;
     if (color->path && opacity->path && strcmp(color->path, opacity->path) == 0)
         color->content = TEXTURE_OPACITY;
-    look->image.texture = image_add(draft, material, color);
+    look->image.texture = mtl_image_add(draft, material, color);
     if (look->image.texture > 0) {
         look->diffuse = vector_multiply(look->diffuse, look->color);
         look->ambient *= vector_mean(look->color);
     }
-    look->normal_map.texture = image_add(draft, material, &material->normal_image);
+    look->normal_map.texture = mtl_image_add(draft, material, &material->normal_image);
     if (look->normal_map.texture > 0) look->normal_map.strength = material->normal_image.strength;
-    look->cutout.texture = image_add(draft, material, opacity);
+    look->cutout.texture = mtl_image_add(draft, material, opacity);
     if (look->cutout.texture == 0) return;
     look->cutout.threshold = CUTOUT_OF_BLENDED;
     look->cutout.blends = true;
 }
 
-static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)
+static uint32_t mtl_material_add(MeshDraft *draft, MtlMaterial *material)
 {
     if (material->scene_index == DRAFT_NONE) {
         textures_use(draft, material);
@@ -436,7 +436,7 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
     const bool all_read = libraries_read(&reader, materials);
     MtlMaterial otherwise = {.name = "", .material = material_default(), .scene_index = DRAFT_NONE};
     if (materials->used.count > 0 && materials->used.items[0].first_corner > 0)
-        array_push(draft->materials, ((DraftMaterialRun){0, material_use(draft, &otherwise)}));
+        array_push(draft->materials, ((DraftMaterialRun){0, mtl_material_add(draft, &otherwise)}));
     UnusedWords unknown = {0};
     for (size_t i = 0; i < materials->used.count; i++) {
         const ObjMaterial *used = &materials->used.items[i];
@@ -444,9 +444,9 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
         if (!material && all_read)
             unused_record(&unknown, &draft->report, used->name,
                           "is in no material file; the default material is used");
-        array_push(
-            draft->materials,
-            ((DraftMaterialRun){used->first_corner, material_use(draft, material ? material : &otherwise)}));
+        array_push(draft->materials,
+                   ((DraftMaterialRun){used->first_corner,
+                                       mtl_material_add(draft, material ? material : &otherwise)}));
     }
     for (size_t i = 0; i < reader.materials.count; i++) {
         MtlMaterial *material = &reader.materials.items[i];

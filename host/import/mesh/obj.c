@@ -97,7 +97,7 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
 
 // Reads the next index, of a vertex or after a slash. Indices count from 1, or backward from the latest
 // element if they are below 0.
-static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
+static bool obj_index_read(ObjReader *reader, DraftPart part, const char *corner)
 {
     enum { DIGITS_MAX = 18 };
     const char *at = reader->line.at, *start = at;
@@ -124,14 +124,14 @@ static bool corner_read(ObjReader *reader)
     static const DraftPart parts[] = {DRAFT_UV, DRAFT_NORMAL};
     const char *start = reader->line.at;
     const size_t corner = reader->draft->corners[DRAFT_POSITION].count;
-    if (!index_read(reader, DRAFT_POSITION, start)) return false;
+    if (!obj_index_read(reader, DRAFT_POSITION, start)) return false;
     for (int i = 0; i < 2; i++) {
         DraftIndices *indices = &reader->draft->corners[parts[i]];
         const bool has_slash = *reader->line.at == '/';
         if (has_slash) reader->line.at++;
         if (has_slash && *reader->line.at != '/' && !word_ends_at(&reader->line, reader->line.at)) {
             if (indices->count == 0) draft_begin_part(reader->draft, parts[i], corner);
-            if (!index_read(reader, parts[i], start)) return false;
+            if (!obj_index_read(reader, parts[i], start)) return false;
         } else if (indices->count > 0) {
             array_push(*indices, DRAFT_NONE);
         }
@@ -147,14 +147,14 @@ static bool face_read(ObjReader *reader)
     return draft_end_face(reader->draft, offset);
 }
 
-static bool material_read(ObjReader *reader)
+static bool used_material_read(ObjReader *reader)
 {
     const ObjMaterial material = {line_rest(&reader->line), reader->draft->face_start};
     array_push(reader->materials.used, material);
     return true;
 }
 
-static bool library_read(ObjReader *reader)
+static bool library_name_read(ObjReader *reader)
 {
     array_push(reader->materials.libraries, line_rest(&reader->line));
     return true;
@@ -171,14 +171,14 @@ static const struct {
     {"vn", normal_read},
     {"f", face_read},
     {"fo", face_read},
-    {"usemtl", material_read},
-    {"mtllib", library_read},
+    {"usemtl", used_material_read},
+    {"mtllib", library_name_read},
     {"g", NULL},
     {"o", NULL},
     {"s", NULL},
 };
 
-static bool line_read(ObjReader *reader)
+static bool obj_line_read(ObjReader *reader)
 {
     const Word word = line_word(&reader->line);
     if (word.length == 0) return true;
@@ -196,7 +196,7 @@ bool obj_read(MeshDraft *draft)
     if (read) {
         do {
             stage_set(draft->stage, line_offset(&reader.line));
-            read = line_read(&reader);
+            read = obj_line_read(&reader);
         } while (read && line_next(&reader.line));
     }
     if (read) draft_drop_missing(draft);

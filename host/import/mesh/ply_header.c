@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-static bool format_read(PlyHeader *header, Line *line)
+static bool format_line_read(PlyHeader *header, Line *line)
 {
     static const char *const names[] = {
         [PLY_ASCII] = "ascii",
@@ -21,7 +21,7 @@ static bool format_read(PlyHeader *header, Line *line)
 }
 
 // Reads a count of at most 18 digits. No file has as many rows as a longer number.
-static bool count_read(Word word, size_t *count)
+static bool element_count_read(Word word, size_t *count)
 {
     enum { DIGITS_MAX = 18 };
     *count = 0;
@@ -32,18 +32,18 @@ static bool count_read(Word word, size_t *count)
     return word.length > 0;
 }
 
-static bool element_read(PlyHeader *header, Line *line)
+static bool element_line_read(PlyHeader *header, Line *line)
 {
     PlyElement element = {.name = line_word(line), .first_property = header->properties.count};
     Word count = line_word(line);
-    if (!count_read(count, &element.count))
+    if (!element_count_read(count, &element.count))
         return report_error(line->report, count.offset, "the number of '%.*s' must be whole, not '%.*s'",
                             WORD_TEXT(element.name), WORD_TEXT(count));
     array_push(header->elements, element);
     return true;
 }
 
-static const PlyType *type_of(Word word)
+static const PlyType *ply_type_named(Word word)
 {
     static const PlyType types[] = {
         {"char", 1, PLY_SIGNED},     {"uchar", 1, PLY_UNSIGNED},  {"short", 2, PLY_SIGNED},
@@ -60,11 +60,11 @@ static const PlyType *type_of(Word word)
 
 static bool type_read(Line *line, Word word, const PlyType **type)
 {
-    *type = type_of(word);
+    *type = ply_type_named(word);
     return *type || report_error(line->report, word.offset, "there is no PLY type '%.*s'", WORD_TEXT(word));
 }
 
-static bool property_read(PlyHeader *header, Line *line)
+static bool property_line_read(PlyHeader *header, Line *line)
 {
     if (header->elements.count == 0)
         return report_error(line->report, line_offset(line), "a property must follow an element");
@@ -87,9 +87,9 @@ static bool property_read(PlyHeader *header, Line *line)
 static bool header_line_read(PlyHeader *header, Line *line)
 {
     Word keyword = line_word(line);
-    if (word_is(keyword, "format")) return format_read(header, line);
-    if (word_is(keyword, "element")) return element_read(header, line);
-    if (word_is(keyword, "property")) return property_read(header, line);
+    if (word_is(keyword, "format")) return format_line_read(header, line);
+    if (word_is(keyword, "element")) return element_line_read(header, line);
+    if (word_is(keyword, "property")) return property_line_read(header, line);
     return true;
 }
 

@@ -197,7 +197,7 @@ static double binary_number(const PlyReader *reader, const PlyType *type)
 }
 
 // Reads the next number of the line or the file. Sets *is_there to whether it has one.
-static bool value_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
+static bool ply_value_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
     if (!is_binary(reader)) return word_read(reader, type, value, is_there);
     *is_there = bytes_left(reader) >= type->size;
@@ -211,7 +211,7 @@ static bool value_read(PlyReader *reader, const PlyType *type, double *value, bo
 static bool number_next(PlyReader *reader, const PlyProperty *property, const PlyType *type, double *value)
 {
     bool is_there;
-    return value_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
+    return ply_value_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
 }
 
 static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t offset, double promised,
@@ -243,14 +243,14 @@ static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *n
     for (size_t i = 0; (double)i < count; i++) {
         double value;
         bool is_there;
-        if (!value_read(reader, property->type, &value, &is_there)) return false;
+        if (!ply_value_read(reader, property->type, &value, &is_there)) return false;
         if (!is_there) return list_fails(reader, property, start, count, i);
         if (numbers) array_push(*numbers, value);
     }
     return true;
 }
 
-static bool property_read(PlyReader *reader, size_t index)
+static bool ply_property_read(PlyReader *reader, size_t index)
 {
     const PlyProperty *property = &properties_of(reader, reader->element)[index];
     const PlyRole role = reader->roles.items[index];
@@ -277,7 +277,7 @@ static bool row_start(PlyReader *reader)
                        WORD_TEXT(reader->element->name), reader->row, reader->element->count);
 }
 
-static bool vertex_add(PlyReader *reader)
+static bool ply_vertex_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->draft;
     const double *numbers = reader->numbers;
@@ -288,7 +288,7 @@ static bool vertex_add(PlyReader *reader)
                             reader->unread);
 }
 
-static bool face_add(PlyReader *reader)
+static bool ply_face_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->draft;
     const size_t offset = line_offset(&reader->line), count = reader->corners.count;
@@ -318,14 +318,14 @@ static bool row_read(PlyReader *reader)
     reader->corners.count = reader->corner_uvs.count = 0;
     if (!is_binary(reader) && !row_start(reader)) return false;
     for (size_t i = 0; i < reader->element->property_count; i++)
-        if (!property_read(reader, i)) return false;
+        if (!ply_property_read(reader, i)) return false;
     if (!is_wanted(reader->element)) return true;
     if (!is_binary(reader) && !reader->has_more_words && line_peek(&reader->line).length > 0) {
         report_warning(&reader->draft->report, line_peek(&reader->line).offset,
                        "words after the last property of a row are ignored");
         reader->has_more_words = true;
     }
-    return word_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
+    return word_is(reader->element->name, "face") ? ply_face_add(reader) : ply_vertex_add(reader);
 }
 
 static void roles_find(PlyReader *reader, const PlyElement *element)
@@ -370,7 +370,7 @@ static bool element_start(PlyReader *reader, const PlyElement *element)
     return true;
 }
 
-static bool element_read(PlyReader *reader, const PlyElement *element)
+static bool element_rows_read(PlyReader *reader, const PlyElement *element)
 {
     MeshDraft *draft = reader->draft;
     draft->places = DRAFT_LINES; // of the header
@@ -402,7 +402,7 @@ bool ply_read(MeshDraft *draft)
     bool read = ply_header_read(&reader.header, &reader.line) && elements_are_sound(&reader);
     if (is_binary(&reader) && !line_next(&reader.line)) reader.line.at = reader.line.end; // no body
     for (size_t i = 0; read && i < reader.header.elements.count; i++)
-        read = element_read(&reader, &reader.header.elements.items[i]);
+        read = element_rows_read(&reader, &reader.header.elements.items[i]);
     if (read) warn_of_rest(&reader);
     ply_header_free(&reader.header);
     free(reader.roles.items);

@@ -37,7 +37,7 @@ static bool facet_end(StlReader *reader, size_t offset)
     return draft_end_face(reader->draft, offset);
 }
 
-static bool line_read(StlReader *reader)
+static bool stl_line_read(StlReader *reader)
 {
     static const char *const known[] = {"facet", "outer", "solid", "endsolid"};
     const Word word = line_word(&reader->line);
@@ -57,7 +57,7 @@ static bool text_read(MeshDraft *draft)
     if (!line_is_text(&reader.line)) return false;
     do {
         stage_set(draft->stage, line_offset(&reader.line));
-        if (!line_read(&reader)) return false;
+        if (!stl_line_read(&reader)) return false;
     } while (line_next(&reader.line));
     return reader.corner_count == 0 ||
            draft_fails(draft, draft->source.length, "the file ends within a facet");

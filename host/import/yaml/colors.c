@@ -49,7 +49,7 @@ static bool hex_read(const char *digits, uint32_t *rgb)
     return true;
 }
 
-static bool name_read(const char *name, uint32_t *rgb)
+static bool color_name_read(const char *name, uint32_t *rgb)
 {
     for (size_t i = 0; i < NAMED_COUNT; i++)
         if (!strcasecmp(name, named_colors[i].name)) {
@@ -61,7 +61,7 @@ static bool name_read(const char *name, uint32_t *rgb)
 
 static bool srgb_read(const char *text, uint32_t *rgb)
 {
-    return text[0] == '#' ? hex_read(text + 1, rgb) : name_read(text, rgb);
+    return text[0] == '#' ? hex_read(text + 1, rgb) : color_name_read(text, rgb);
 }
 
 bool is_color_text(const char *text)

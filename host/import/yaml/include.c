@@ -67,7 +67,7 @@ static Joined joined_open(const Includes *includes, uint32_t root)
 }
 
 // Appends a key and its value to the mapping.
-static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
+static void joined_append(const Includes *includes, Joined *joined, uint32_t key)
 {
     YamlNode *root = yaml_node(includes->tree, joined->root);
     const uint32_t value = yaml_node(includes->tree, key)->next;
@@ -117,7 +117,7 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
             yaml_children_unshare(&reader->tree, value);
             joined->joined[section] = last_child(includes, value);
         }
-        pair_append(includes, joined, key);
+        joined_append(includes, joined, key);
     } else if (is_joined && yaml_node(includes->tree, existing)->type == type) {
         children_join(includes, joined, section, value);
     }
@@ -132,7 +132,7 @@ static void file_join(const Includes *includes, Joined *joined, uint32_t root)
         const size_t section = section_of(includes, key);
         next = yaml_node(includes->tree, yaml_node(includes->tree, key)->next)->next;
         if (section == SECTION_COUNT) { // unknown, which is reported with all others
-            pair_append(includes, joined, key);
+            joined_append(includes, joined, key);
         } else if (seen[section]) {
             report_error(&reader->report, yaml_node(includes->tree, key)->offset, "'%s' is given twice",
                          sections[section].name);
@@ -175,7 +175,7 @@ static bool text_parse(Includes *includes, Source *source, uint32_t *root)
 static bool includes_read(Includes *includes, uint32_t root);
 
 // Reads a file for the first time and adds it to the mapping.
-static bool file_read(Includes *includes, Joined *joined, const char *path, const YamlNode *node)
+static bool included_file_read(Includes *includes, Joined *joined, const char *path, const YamlNode *node)
 {
     YamlReader *reader = includes->reader;
     Text text = {0};
@@ -213,7 +213,7 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
     if (includes->is_full)
         return report_error(&reader->report, node->offset, "a scene may include at most %d files", FILES_MAX);
     includes->files[includes->file_count++] = (KnownFile){.file = file};
-    return file_read(includes, joined, path, node);
+    return included_file_read(includes, joined, path, node);
 }
 
 // Removes the `include` of a mapping. Returns the index of its value, or 0 if there is none.

@@ -243,14 +243,14 @@ static bool material_append(YamlReader *reader, const YamlNode *node, const char
     return is_read;
 }
 
-static int names_compare(const void *a, const void *b)
+static int material_names_compare(const void *a, const void *b)
 {
     const MaterialName *first = a, *second = b;
     int order = strcmp(first->name, second->name);
     return order ? order : (first->material > second->material) - (first->material < second->material);
 }
 
-static int name_matches(const void *word, const void *name)
+static int material_name_matches(const void *word, const void *name)
 {
     return strcmp(word, ((const MaterialName *)name)->name);
 }
@@ -269,7 +269,7 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node)
         material_append(reader, value, name.name);
     }
     if (!reader->names.count) return;
-    qsort(reader->names.items, reader->names.count, sizeof(MaterialName), names_compare);
+    qsort(reader->names.items, reader->names.count, sizeof(MaterialName), material_names_compare);
     for (size_t i = 1; i < reader->names.count && !report_is_full(&reader->report); i++) {
         const MaterialName *name = &reader->names.items[i];
         if (!strcmp(name[-1].name, name->name))
@@ -299,7 +299,7 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
         return expected_report(reader, field->name, "the name of a material or a mapping", node);
     const MaterialName *name = reader->names.count
                                    ? bsearch(yaml_text(&reader->tree, node), reader->names.items,
-                                             reader->names.count, sizeof(MaterialName), name_matches)
+                                             reader->names.count, sizeof(MaterialName), material_name_matches)
                                    : NULL;
     if (!name) return unknown_material_report(reader, node);
     *index = name->material;

@@ -60,7 +60,7 @@ static bool path_report(const Path *path)
                         "a value is set by PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
 }
 
-static bool is_last(const Path *path)
+static bool part_is_last(const Path *path)
 {
     return path->text[path->at] == '=';
 }
@@ -73,7 +73,7 @@ static bool is_blank(const char *text)
 // Returns whether the current part may name a new node, because it is the last part and a value follows.
 static bool can_add(const Path *path)
 {
-    return is_last(path) && !is_blank(path->text + path->at + 1);
+    return part_is_last(path) && !is_blank(path->text + path->at + 1);
 }
 
 // Reports a missing name. A new name within a path is probably a mistake.
@@ -141,7 +141,7 @@ static bool index_follow(Path *path, uint32_t index, size_t start)
     return true;
 }
 
-static bool index_read(Path *path)
+static bool path_index_read(Path *path)
 {
     const size_t start = path->at, digits = strspn(path->text + start + 1, "0123456789");
     path->at += 1 + digits;
@@ -152,7 +152,7 @@ static bool index_read(Path *path)
 }
 
 // Reads a name up to the next part. A quoted name may have any characters but the quote.
-static bool name_read(Path *path)
+static bool path_name_read(Path *path)
 {
     const char first = path->text[path->at];
     const bool is_quoted = first == '"' || first == '\'';
@@ -175,14 +175,14 @@ static bool path_follow(Path *path)
             if (path->text[path->at] != '.') return path_report(path);
             path->at++;
         }
-        if (!(is_index ? index_read(path) : name_read(path))) return false;
-    } while (!is_last(path));
+        if (!(is_index ? path_index_read(path) : path_name_read(path))) return false;
+    } while (!part_is_last(path));
     path->at++;
     return true;
 }
 
 // Adds the nodes of the VALUE and sets the index of their root. A # begins a color, not a comment.
-static bool value_read(const Path *path, uint32_t *root)
+static bool override_value_read(const Path *path, uint32_t *root)
 {
     const size_t start = path->at + strspn(path->text + path->at, " ");
     if (path->text[start] == '#') {
@@ -210,7 +210,7 @@ static bool override_apply(YamlTree *tree, Report *report, size_t base)
         node_remove(&path);
         return true;
     }
-    if (!value_read(&path, &value)) return false;
+    if (!override_value_read(&path, &value)) return false;
     const uint32_t next = yaml_node(path.tree, path.node)->next;
     *yaml_node(path.tree, path.node) = *yaml_node(path.tree, value);
     yaml_node(path.tree, path.node)->next = next;

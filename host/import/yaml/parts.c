@@ -23,7 +23,7 @@ typedef struct {
     ARRAY_OF(size_t) offsets; // of lines that begin parts, and of the last item's line
 } Cuts;
 
-static size_t line_next(const Source *source, size_t at)
+static size_t text_line_next(const Source *source, size_t at)
 {
     const char *end = memchr(source->bytes + at, '\n', source->length - at);
     return end ? (size_t)(end - source->bytes) + 1 : source->length;
@@ -63,10 +63,10 @@ static size_t list_find(const Source *source)
     static const char key[] = "objects:";
     size_t at = 0;
     while (at < source->length && !begins_with(source, at, key))
-        at = line_next(source, at);
+        at = text_line_next(source, at);
     if (at == source->length || !rest_is_blank(source, at + strlen(key))) return source->length;
     do
-        at = line_next(source, at);
+        at = text_line_next(source, at);
     while (at < source->length && rest_is_blank(source, at));
     return begins_with(source, spaces_skip(source, at), "- ") ? at : source->length;
 }
@@ -77,7 +77,7 @@ static void cuts_find(Cuts *cuts, const Source *source, size_t part_bytes)
     size_t last = 0, at = list_find(source);
     if (at == source->length) return;
     cuts->indent = spaces_skip(source, at) - at;
-    while ((at = line_next(source, at)) < source->length) {
+    while ((at = text_line_next(source, at)) < source->length) {
         if (spaces_skip(source, at) - at == cuts->indent && is_item(source, at + cuts->indent)) {
             last = at;
             if (cuts->offsets.count == 0 || at - cuts->offsets.items[cuts->offsets.count - 1] >= part_bytes)

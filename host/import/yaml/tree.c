@@ -34,7 +34,7 @@ static bool source_is_text(const Source *source, Report *report)
     return true;
 }
 
-static bool is_blank(char character)
+static bool character_is_space(char character)
 {
     return character == ' ' || character == '\t' || character == '\r' || character == '\n';
 }
@@ -46,7 +46,7 @@ static bool may_begin_key(const char *start, const char *at)
     while (at > start && (at[-1] == ' ' || at[-1] == '\t'))
         at--;
     if (at == start || !isascii(at[-1]) || strchr("\r\n-?:[{,", at[-1])) return true;
-    while (at > start && !is_blank(at[-1]))
+    while (at > start && !character_is_space(at[-1]))
         at--;
     return *at == '&' || *at == '!';
 }
@@ -58,8 +58,8 @@ static bool source_is_safe(const Source *source, Report *report)
     const char *start = source->bytes, *end = start + source->length;
     if (!memchr(start, '\t', source->length)) return true;
     for (const char *at = start; (at = memchr(at, '?', (size_t)(end - at))); at++) {
-        const bool is_apart =
-            (at == start || is_blank(at[-1]) || !isascii(at[-1])) && (at + 1 == end || is_blank(at[1]));
+        const bool is_apart = (at == start || character_is_space(at[-1]) || !isascii(at[-1])) &&
+                              (at + 1 == end || character_is_space(at[1]));
         if (is_apart && may_begin_key(start, at))
             return report_error(report, (size_t)(at - start),
                                 "a '?' begins a key in a text with tabs; replace the tabs by spaces");
