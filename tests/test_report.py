@@ -90,8 +90,10 @@ class Report(TestCase):
         write("bin/tar", "#!/bin/sh\necho unusual >&2\nexit 2\n")
         os.chmod("bin/tar", 0o755)
         path = f"{os.path.abspath('bin')}:{os.environ['PATH']}"
-        self.assertIn("error: tar cannot write the archive: exit status 2: unusual\n", self.glint(SMALL, 1, env=self.env | {"PATH": path}).stderr)
-        self.assertEqual((os.listdir("temporary"), os.path.exists("r.tar.gz")), ([], False))
+        errors = self.glint(SMALL, 2, env=self.env | {"PATH": path}).stderr
+        folder = re.search(r"error: tar cannot write the archive: exit status 2: unusual; its files stay in (.*)\n", errors)[1]
+        self.assertIn("index.txt", os.listdir(folder))
+        self.assertFalse(os.path.exists("r.tar.gz"))
 
     def test_rejected_kernels(self):
         """The index names the steps that fail, and the logs say why. The root folder is not replaced by ~."""

@@ -14,6 +14,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
+#include <math.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
@@ -254,7 +255,8 @@ static int step_start(const Step *step, const ReportChoice *choice, const char *
     return error;
 }
 
-static StepResult step_run(const Step *step, const ReportChoice *choice, const char *folder,
+// Runs a step, which is killed after `seconds`.
+static StepResult step_run(const Step *step, const ReportChoice *choice, double seconds, const char *folder,
                            Progress *progress, double fraction)
 {
     progress_step(progress, fraction, "%s", step->name);
@@ -265,8 +267,8 @@ static StepResult step_run(const Step *step, const ReportChoice *choice, const c
     const int error = step_start(step, choice, folder, &process);
     if (error)
         result.failure = text_format("not started: %s", strerror(error));
-    else if (!process_wait(process, choice->seconds, progress, fraction, &status))
-        result.failure = text_format("stopped after %s", text_duration(choice->seconds).text);
+    else if (!process_wait(process, seconds, progress, fraction, &status))
+        result.failure = text_format("stopped after %s", text_duration(seconds).text);
     else
         result.failure = status_failure(status);
     result.seconds = clock_seconds() - start;
@@ -286,27 +288,26 @@ static Text results_text(const StepResult *results, MessageList *messages)
     return text;
 }
 
-// Archives the files of the folder. Returns their number, or 0 with a message on failure.
-static size_t archive_write(const ReportChoice *choice, const char *folder, const char *lines,
-                            OutputFile *output, Progress *progress, MessageList *messages)
+// Archives the files of the folder by tar. Returns the exit status, which is EXIT_MACHINE if tar fails.
+static int archive_write(const ReportChoice *choice, const char *folder, OutputFile *output,
+                         Progress *progress, MessageList *messages)
 {
-    Scrubber scrubber = scrubber_open(folder);
-    const size_t count = report_files_prepare(folder, &scrubber, lines, messages);
-    scrubber_close(&scrubber);
-    if (count == 0) return 0;
-    OWNED char *failure = step_run(&archive_step, choice, folder, progress, 1).failure;
+    OWNED char *failure = step_run(&archive_step, choice, INFINITY, folder, progress, 1).failure;
     OWNED char *path = text_format("%s/archive.tar.gz", folder);
     OWNED char *log_path = text_format("%s/archive.log", folder);
     OwnedText archive = {0}, log = {0};
-    if (failure && !is_interrupted()) {
-        if (text_read_file(&log, log_path, messages) && log.count > 0) log.items[log.count - 1] = '\0';
-        message_error(messages, "tar cannot write the archive: %s%s%s", failure, log.count > 0 ? ": " : "",
-                      text_c(&log));
+    if (is_interrupted()) return EXIT_INTERRUPTED;
+    if (failure) {
+        text_read_file(&log, log_path, NULL);
+        const int length = (int)strcspn(text_c(&log), "\n"); // later lines are consequences
+        message_error(messages, "tar cannot write the archive: %s%s%.*s; its files stay in %s", failure,
+                      length > 0 ? ": " : "", length, text_c(&log), folder);
+        return EXIT_MACHINE;
     }
-    const bool is_written = !failure && text_read_file(&archive, path, messages) &&
+    const bool is_written = text_read_file(&archive, path, messages) &&
                             output_write(output, archive.items, archive.count, messages) &&
                             output_commit(output, messages);
-    return is_written ? count : 0;
+    return is_written ? EXIT_DONE : EXIT_USER;
 }
 
 // Runs the steps and writes the archive. Returns the exit status.
@@ -318,18 +319,22 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     variables_set(folder);
     progress_open(&progress, false);
     for (size_t i = 0; i < STEP_COUNT && !is_interrupted(); i++)
-        results[i] = step_run(&steps[i], choice, folder, &progress, (double)i / STEP_COUNT);
+        results[i] = step_run(&steps[i], choice, choice->seconds, folder, &progress, (double)i / STEP_COUNT);
     size_t count = 0;
+    int status = EXIT_INTERRUPTED;
     if (!is_interrupted()) {
         OwnedText lines = results_text(results, messages);
-        count = archive_write(choice, folder, text_c(&lines), output, &progress, messages);
+        Scrubber scrubber = scrubber_open(folder);
+        count = report_files_prepare(folder, &scrubber, text_c(&lines), messages);
+        scrubber_close(&scrubber);
+        status = count > 0 ? archive_write(choice, folder, output, &progress, messages) : EXIT_USER;
     }
     progress_close(&progress);
     for (size_t i = 0; i < STEP_COUNT; i++)
         free(results[i].failure);
-    if (count == 0) return is_interrupted() ? EXIT_INTERRUPTED : EXIT_USER;
-    if (strcmp(choice->output, "-") != 0) printf("%s: %zu files\n", choice->output, count);
-    return EXIT_DONE;
+    if (status == EXIT_DONE && strcmp(choice->output, "-") != 0)
+        printf("%s: %zu files\n", choice->output, count);
+    return status;
 }
 
 // Opens the archive, runs the steps and writes it. Returns the exit status.
@@ -341,9 +346,11 @@ static int archive_make(ReportChoice *choice)
     MessageList messages = {0};
     const bool is_open = output_open(&output, choice->output, &messages);
     OWNED char *folder = is_open ? steps_folder_create(&messages) : NULL;
-    int status = is_open ? EXIT_MACHINE : EXIT_USER;
-    if (folder && inputs_write(folder, &messages)) status = report_make(choice, folder, &output, &messages);
-    if (folder) folder_remove(folder);
+    const bool is_ready = folder && inputs_write(folder, &messages);
+    const int status = is_ready  ? report_make(choice, folder, &output, &messages)
+                       : is_open ? EXIT_MACHINE
+                                 : EXIT_USER;
+    if (folder && !(is_ready && status == EXIT_MACHINE)) folder_remove(folder);
     if (is_open && status != EXIT_DONE) output_abandon(&output);
     messages_print(&messages, NULL);
     return status;
