@@ -191,7 +191,7 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, &scene, &settings, &messages);
     messages_print(&messages, golden->scene);
-    int status = renderer ? EXIT_DONE : EXIT_USER;
+    int status = renderer ? EXIT_DONE : compute_check_reference(compute) ? EXIT_USER : EXIT_MACHINE;
     if (renderer && !renderer_render_film(renderer, aovs, film))
         status = is_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     if (status == EXIT_DONE) {
