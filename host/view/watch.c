@@ -5,7 +5,9 @@
 #include "host/base/array.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include <errno.h>
+#include <limits.h>
 #include <poll.h>
 #include <pthread.h>
 #include <stdbool.h>
@@ -136,12 +138,22 @@ static void place_add(Watch *watch, const char *place, const char *path)
     }
 }
 
-// Watches the file and, if it is a symbolic link or in a folder that is one, what it leads to.
+// Watches the file and, if it is a symbolic link, each link on the way and the file to which they lead, which
+// may be missing.
 static void file_add(Watch *watch, const char *path)
 {
-    OWNED char *target = realpath(path, NULL);
-    place_add(watch, path, path);
-    if (target && strcmp(target, path) != 0) place_add(watch, target, path);
+    enum { LINKS_MAX = 40 }; // as in the kernel
+    OwnedText place = {0};
+    text_append(&place, path, strlen(path));
+    for (int i = 0; i < LINKS_MAX; i++) {
+        char link[PATH_MAX];
+        place_add(watch, text_c(&place), path);
+        const ssize_t length = readlink(text_c(&place), link, sizeof link);
+        if (length <= 0) return;
+        const char *slash = strrchr(text_c(&place), '/');
+        place.count = link[0] != '/' && slash ? (size_t)(slash + 1 - place.items) : 0;
+        text_append(&place, link, (size_t)length);
+    }
 }
 
 void watch_add(Watch *watch, const char *path)
