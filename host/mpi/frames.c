@@ -76,15 +76,17 @@ static bool uses_standard_streams(const RenderCommand *command)
 // first image (output.h), so that the next process that replaces the image removes what a killed one left.
 static void marker_make(const RenderCommand *command, char *name)
 {
+    enum { TRIES = 100 };
     const char *path = command->paths[0], *image = file_base_name(path);
-    const int length =
-        snprintf(name, MARKER_BYTES, "%.*s.%.200s.glint-%d", (int)(image - path), path, image, (int)getpid());
-    const int descriptor =
-        length < MARKER_BYTES ? open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600) : -1;
-    if (descriptor >= 0)
-        close(descriptor);
-    else
-        name[0] = '\0';
+    for (int i = 0; i < TRIES; i++) {
+        const int length =
+            snprintf(name, MARKER_BYTES, "%.*s.%.200s.glint-%d", (int)(image - path), path, image, i);
+        if (length >= MARKER_BYTES) break;
+        const int descriptor = open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        if (descriptor >= 0) close(descriptor);
+        if (descriptor >= 0) return;
+    }
+    name[0] = '\0';
 }
 
 // Returns whether all ranks see the scenes and the images' folder. All ranks call it; `command` is NULL if
