@@ -19,7 +19,7 @@ check "the static library exports the same" diff <(nm -g --defined-only "$stage/
 # Only crash handling, exit() and constants that are computed once need process-wide variables. Only faults print.
 check "libglint has no other process-wide variables" diff <(nm "$stage/lib/libglint.a" | sed -n 's/.* [bB] \([a-z_0-9]*\).*/\1/p' | sort -u) \
     <(printf '%s\n' c_locale calling_threads complete_status crash_record curve_16 curve_8 is_complete last_call \
-        limits noted_call noted_kernel once once_16 once_8 pending pending_mutex stack | sort)
+        limits current_call current_kernel once once_16 once_8 pending pending_mutex stack | sort)
 check "only faults print to stderr" test "$(cd host && grep -rlwE --include='*.c' 'stderr|perror' base image opencl scene import compile render api)" = base/fault.c
 
 # Compiles in the stage, where the tree is out of sight.

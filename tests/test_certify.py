@@ -215,7 +215,7 @@ define:
 objects: [{", ".join(["{instance: {of: row}}"] * 132)}]
 """)
         self.refuses("certify large.yaml", "does not support more than 67,108,864 objects and triangles")
-        self.refuses("render large.yaml --precision certified --size 8x8 -o x.png", "precision certified shares no meshes")
+        self.refuses("render large.yaml --precision certified --size 8x8 -o x.png", "precision certified copies the mesh of each instance")
 
 
 if __name__ == "__main__":
