@@ -1,6 +1,7 @@
 #include "tests/scene_reading.h"
 #include "host/import/load.h"
 #include "tests/check.h"
+#include "tests/files.h"
 
 bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages)
 {
@@ -75,6 +76,35 @@ Scene scene_of_text(const char *name, const char *text)
     if (!read) message_list_print(&messages, stderr);
     assert_true(read);
     return scene;
+}
+
+size_t exact_scenes_read(ExactScene scenes[EXACT_SCENES_MAX])
+{
+    static const char path[] = "tests/exact_scenes.txt", start_mark[] = "#### start",
+                      scene_mark[] = "#### scene ";
+    static Text table;
+    table = file_text(path);
+    OwnedText start = {0};
+    Text *text = &start;
+    size_t count = 0;
+    for (char *line = strtok(table.items, "\n"); line; line = strtok(NULL, "\n")) {
+        if (strcmp(line, start_mark) == 0) {
+            text_free(&start);
+            text = &start;
+        } else if (strncmp(line, scene_mark, strlen(scene_mark)) == 0) {
+            assert_true(count < EXACT_SCENES_MAX);
+            ExactScene *scene = &scenes[count++];
+            *scene = (ExactScene){0};
+            char *name = NULL;
+            scene->bounce_count = (unsigned)strtoul(line + strlen(scene_mark), &name, 10);
+            scene->name = name + 1;
+            text = &scene->text;
+            text_append(text, text_c(&start), start.count);
+        } else {
+            text_appendf(text, "%s\n", line);
+        }
+    }
+    return count;
 }
 
 CompiledScene scene_compiled(const Scene *scene, const CompileSettings *settings)

@@ -27,6 +27,18 @@ Scene scene_of_file(const char *path);
 // Returns the scene of a text, which may get warnings.
 Scene scene_of_text(const char *name, const char *text);
 
+// A scene of tests/exact_scenes.txt, with its number of bounces in a row.
+typedef struct {
+    const char *name;
+    unsigned bounce_count;
+    Text text;
+} ExactScene;
+
+enum { EXACT_SCENES_MAX = 32 };
+
+// Reads the whole table and returns the number of scenes. They are never freed.
+size_t exact_scenes_read(ExactScene scenes[EXACT_SCENES_MAX]);
+
 // Returns the flat arrays of a scene, which must be compiled with no messages.
 CompiledScene scene_compiled(const Scene *scene, const CompileSettings *settings);
 
