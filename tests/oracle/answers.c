@@ -3,12 +3,16 @@
 // arithmetic.
 //
 //     answers [SAMPLES [FURTHER]]
+//     answers image WIDTH HEIGHT
 //
 // SAMPLES is the number of random rays at each random object. FURTHER is the last ray, without an answer, to
 // print of each family that is closed. A line is a JSON object: a set's name, then its objects, then its
-// rays.
+// rays. With `image` these are the rays of images of tests/exact_scenes.txt, and what they show.
+#include "host/base/memory.h"
 #include "host/verify/checks.h"
+#include "host/verify/reference_color.h"
 #include "tests/random_ray.h"
+#include "tests/scene_reading.h"
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -152,8 +156,46 @@ static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
     }
 }
 
+static void pixel_print(const Scene *scene, unsigned bounce_count, const ReferenceRay *ray)
+{
+    bool *shadows = memory_allocate_zeroed(scene->lights.count, sizeof *shadows);
+    const ReferenceScene world = {*scene, NULL};
+    const ReferencePixel pixel =
+        reference_pixel(&world, ray, &(ReferencePath){.bounce_count = bounce_count}, shadows);
+    printf("{");
+    numbers_print("color", &pixel.color.x, 3);
+    printf(", \"object\": %u, \"path\": %u, \"shadows\": [", pixel.object, pixel.path);
+    for (size_t i = 0; i < scene->lights.count; i++)
+        printf("%s%s", i > 0 ? ", " : "", json_of(shadows[i]));
+    printf("]");
+    quad_print("x", ray->direction.x);
+    quad_print("y", ray->direction.y);
+    quad_print("z", ray->direction.z);
+    printf("}\n");
+    free(shadows);
+}
+
+static void images_print(unsigned width, unsigned height)
+{
+    ExactScene scenes[EXACT_SCENES_MAX];
+    const size_t count = exact_scenes_read(scenes);
+    for (size_t i = 0; i < count; i++) {
+        printf("{\"scene\": \"%s\", \"bounces\": %u}\n", scenes[i].name, scenes[i].bounce_count);
+        OwnedScene scene = scene_of_text("image.yaml", text_c(&scenes[i].text));
+        for (unsigned pixel = 0; pixel < width * height; pixel++) {
+            const ReferenceRay ray =
+                reference_camera_ray(&scene.camera, width, height, pixel % width, pixel / width);
+            pixel_print(&scene, scenes[i].bounce_count, &ray);
+        }
+    }
+}
+
 int main(int argument_count, char **arguments)
 {
+    if (argument_count == 4 && strcmp(arguments[1], "image") == 0) {
+        images_print((unsigned)strtoul(arguments[2], NULL, 10), (unsigned)strtoul(arguments[3], NULL, 10));
+        return EXIT_SUCCESS;
+    }
     size_t samples = argument_count > 1 ? strtoul(arguments[1], NULL, 10) : 0;
     size_t further = argument_count > 2 ? strtoul(arguments[2], NULL, 10) : 0;
     for (size_t i = 0; i < verify_rays_count; i++)

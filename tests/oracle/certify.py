@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
 """Checks the reference (host/verify/reference.h) in exact arithmetic.
 
-usage: answers 24 | certify.py [--long] [--spoil PART] [--set NAME]
+usage: { answers 24; answers image 16 12; } | certify.py [--long] [--spoil PART] [--set NAME]
 
 tests/oracle/answers.c prints rays of the hard cases and random ones with what the reference answers. Hit or miss has to
 be right wherever the margin is not smaller than quadruple precision resolves; t, the cosine and the normal within a
 thousandth of what `double` could see. The margin, by which tiers leave hit or miss open, must never be larger than what
 decides: a solid grown or shrunk by less answers the same. Nor may it always be small: grown or shrunk by four times as
 much most solids answer otherwise.
+
+It also prints what the pixels of tests/exact_scenes.txt show. Their objects, paths and shadows have to be right, and their colors
+within COLOR.
 
 Prints what was compared and the worst errors as parts of their bounds; exit status 1 if one is beyond its bound or too
 little was compared. In large families the first 200 rays are checked, with --long all of them. --spoil first changes each
@@ -20,10 +23,16 @@ from collections import Counter
 from fractions import Fraction
 
 import exact
-from color import grown
-from exact import fraction
+import yaml
+from color import Pixel
+from exact import fraction, grown
+from scene import Scene
+
+sys.path.insert(0, "tests")
+from scene_tables import scenes
 
 PART = Fraction(1, 2**62)
+COLOR = Fraction(1, 2**50)  # the reference adds up colors in double
 RESOLVED = 2.0**-80  # margins below this part of the size may be lost in roundings
 BEND = 0.01  # margins up to this part of the radius are proportional to distances
 SHAPES = "sphere", "plane", "disc", "box", "cylinder", "cone", "paraboloid", "superellipsoid", "triangle", "torus"
@@ -32,10 +41,10 @@ LEAST = {"hit or miss": 100, "t": 60, "normal": 60}  # of each shape
 
 
 class Set:
-    """A scene and what rays at it should hit."""
+    """A scene and what rays at it should hit. bounces: of an image's rays, else None."""
 
-    def __init__(self, name, wide):
-        self.name, self.wide, self.given, self.rays = name, wide, [], []
+    def __init__(self, name, bounces=None):
+        self.name, self.bounces, self.given, self.rays = name, bounces, [], []
 
 
 def sets_read(stream):
@@ -43,7 +52,9 @@ def sets_read(stream):
     for line in stream:
         entry = json.loads(line)
         if "set" in entry:
-            sets.append(Set(entry["set"], entry["wide"]))
+            sets.append(Set(entry["set"]))
+        elif "scene" in entry:
+            sets.append(Set(entry["scene"], entry["bounces"]))
         elif "shape" in entry:
             sets[-1].given.append(entry)
         else:
@@ -140,6 +151,21 @@ def check_margin(kind, shape, ray, given, tallies):
         tallies.counts["tight margins"] += any(is_found(by) != given["found"] for by in (2 * margin, -2 * margin))
 
 
+def check_image(set_, given, tallies):
+    """Checks the pixels of an image of a scene of tests/exact_scenes.txt."""
+    scene = Scene(given)
+    for pixel in set_.rays:
+        direction = [sum(map(Fraction, pixel[axis])) for axis in "xyz"]
+        answer = Pixel(scene, exact.Ray(given["camera"]["position"], direction), set_.bounces)
+        where = f"{set_.name}: {pixel}"
+        tallies.record("pixel: object", int(answer.object != pixel["object"]), 0, where)
+        tallies.record("pixel: path", int(answer.path != pixel["path"]), 0, where)
+        if answer.shadows is not None:
+            tallies.record("pixel: shadows", int(answer.shadows != pixel["shadows"]), 0, where)
+        off = max(abs(tallies.spoiled([x, 0]) - fraction(y)) for x, y in zip(pixel["color"], answer.color))
+        tallies.record("pixel: color", off, COLOR, where)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--spoil", type=Fraction, default=Fraction(0))
@@ -147,8 +173,12 @@ def main():
     parser.add_argument("--set")
     options = parser.parse_args()
     tallies = Tallies(options.spoil)
+    images = {scene.name: yaml.safe_load(scene.content) for scene in scenes("tests/exact_scenes.txt")}
     for set_ in sets_read(sys.stdin):
         if options.set not in (None, set_.name):
+            continue
+        if set_.bounces is not None:
+            check_image(set_, images[f"{set_.bounces} {set_.name}"], tallies)
             continue
         shapes = [exact.shape_of(given) for given in set_.given]
         kind = set_.given[0]["shape"]
@@ -163,6 +193,7 @@ def main():
         print(f"{kind:24} {count:6} compared{worst}")
     counts = tallies.counts
     is_enough = all(counts[f"{shape}: {kind}"] >= least for shape in SHAPES for kind, least in LEAST.items())
+    is_enough = is_enough and counts["pixel: color"] >= 2000
     is_tight = counts["tight margins"] >= counts["narrow margins"] / 2 > 50
     sys.exit(0 if is_enough and is_tight and tallies.wrong == 0 else 1)
 

@@ -1,21 +1,15 @@
-"""Computes the color of an image's ray at 300 bits, and a bound on the error of a renderer that rounds.
+"""Computes what a ray of an image and its reflections and refractions show, at 300 bits, by the formulas of docs/scene-format.md."""
 
-Every result carries a first-order bound on rounding. A shape is assumed to be computed exactly except for a displacement of its
-surface by `displacement` units in the last place of the magnitudes that it is computed from. If a surface that is so much nearer or
-farther gives another answer, or another surface comes in between, the answer is open and nothing is compared."""
-
-from math import floor, inf, log, sqrt
+from math import floor
 
 import exact
-from exact import cross, dot, fraction, length, middle, off_axis_squared, rational, subtract
+from exact import cross, dot, fraction, middle, rational, subtract
 from flint import arb, fmpq
 from scene import unit
 
-TINY = fmpq(1, 2**150)
-
-
-def as_float(number):
-    return float(fraction(number))
+TINY = fmpq(1, 2**150)  # a crossing nearer to the start of a ray is of the surface that it leaves
+PATH_START, PATH_FACTOR, PATH_EVENTS, EVENT_REFLECTED, EVENT_REFRACTED, EVENT_TOTAL = 0x811C9DC5, 0x01000193, 8, 1, 2, 4
+NONE = 2**32 - 1  # the object of the background
 
 
 def times(vector, factor):
@@ -26,480 +20,210 @@ def add(a, b):
     return [p + q for p, q in zip(a, b)]
 
 
-class Rounding:
-    """u: half a unit in the last place of 1. displacement: see above. arithmetic: roundings, in u, that a short formula
-    for shading may sum up."""
-
-    def __init__(self, u, displacement, arithmetic):
-        self.u, self.displacement, self.arithmetic = u, displacement, arithmetic
+def channels(a, b):
+    return [p * q for p, q in zip(a, b)]
 
 
-class Beam:
-    """A ray with what is unsure about it: its origin by `off`, its unit direction by `turn`. left: the thing that it
-    leaves, at a cosine to its normal. magnitude: of the numbers that its origin was computed from."""
-
-    def __init__(self, origin, direction, off=0.0, turn=0.0, left=None, cosine=1.0, magnitude=0.0):
-        self.ray = exact.Ray(origin, direction)
-        self.off, self.turn, self.left, self.cosine, self.magnitude = off, turn, left, cosine, magnitude
+def is_flat(thing):
+    return isinstance(thing.shape, exact.Plane)
 
 
-def grown(shape, by):
-    """Returns the solid with its surface moved outward by so much, or inward below 0."""
-    if isinstance(shape, exact.Sphere):
-        return exact.Sphere(shape.center, exact.Fraction(shape.radius) + exact.Fraction(by))
-    if isinstance(shape, exact.Box):
-        return exact.Box([x - rational(by) for x in shape.low], [x + rational(by) for x in shape.high])
-    if isinstance(shape, exact.Torus):
-        return exact.Torus(shape.center, shape.major, shape.minor + rational(by), shape.axis)
-    if isinstance(shape, exact.DoubleCone):
-        sine = as_float(shape.slope) / sqrt(1 + as_float(shape.slope) ** 2)
-        return exact.DoubleCone(shape.center, shape.axis, shape.slope, -by / sine / length(shape.axis))
-    if isinstance(shape, exact.Superellipsoid):
-        longer = [times(axis, 1 + rational(by / length(axis))) for axis in shape.axes]
-        return exact.Superellipsoid(shape.center, longer, shape.exponent)
-    if isinstance(shape, exact.Paraboloid):
-        # with its apex moved by s and its focal length f by g, the surface at height z moves by (f s + z g) /
-        # sqrt(f (f + z)): by as much at the apex and the rim, and by less between; an infinite one at its apex
-        height = shape.end / shape.unit
-        f, z = as_float(shape.focal_length), as_float(height)
-        wider = 0 if shape.infinite else by * (sqrt(f * (f + z)) - f) / z
-        apex = [c - rational(by) / shape.unit * a for c, a in zip(shape.center, shape.axis)]
-        focal_length = shape.focal_length + rational(wider)
-        return exact.Paraboloid(apex, shape.axis, focal_length, height + 2 * rational(by), shape.infinite, shape.caps)
-    ends = rational(by / shape.axis_length)
-    slope = (shape.radii[1] - shape.radii[0]) / rational(shape.axis_length)
-    wider = rational(by * sqrt(1 + as_float(slope) ** 2))
-    radii = [shape.radii[0] + wider - slope * rational(by), shape.radii[1] + wider + slope * rational(by)]
-    base = [b - ends * a for b, a in zip(shape.base, shape.axis)]
-    return exact.Revolution(base, times(shape.axis, 1 + 2 * ends), radii, shape.infinite, shape.caps)
+def ray_from(point, way):
+    """Returns a ray whose numbers are rounded to 300 bits, which keeps them short."""
+    return exact.Ray([middle(arb(x)) for x in point], [middle(arb(x)) for x in way])
 
 
-def off_axis(shape, point):
-    p = subtract(point, shape.base if isinstance(shape, exact.Revolution) else shape.center)
-    return sqrt(max(as_float(off_axis_squared(p, shape.axis)), 0.0))
-
-
-def curvature(thing, point):
-    """Returns the largest curvature at a place of the surface, which is how fast the shading normal turns."""
+def first_crossing(thing, ray, start):
+    """Returns t of the first crossing beyond the start, or None."""
     shape = thing.shape
-    if thing.normals is not None:
-        normals = [[as_float(x) for x in unit(normal)] for normal in thing.normals]
-        apart = max(length(subtract(exact.vector(a), exact.vector(b))) for a, b in zip(normals, normals[1:] + normals))
-        return 2 * apart * shape.size / length(shape.direction)
-    if isinstance(shape, exact.Plane) or isinstance(shape, exact.Box):
-        return 0.0
-    if isinstance(shape, exact.Torus):
-        hole = shape.major_radius - shape.radius
-        return 1 / min(shape.radius, hole if hole > 0 else max(off_axis(shape, point), 1e-30))
-    if isinstance(shape, exact.Sphere):
-        return 1 / shape.radius
-    if isinstance(shape, exact.Paraboloid):
-        return 1 / (2 * as_float(shape.focal_length))
-    return 1 / max(off_axis(shape, point), 1e-30)
-
-
-def rim_distance(shape, point):
-    """Returns how far a place of the surface is from where its normal breaks."""
-    if isinstance(shape, exact.Box):
-        faces = sorted(as_float(min(abs(x - a), abs(x - b))) for a, x, b in zip(shape.low, point, shape.high))
-        return faces[1]
-    if isinstance(shape, exact.Revolution) and shape.has_ends():
-        height = as_float(dot(subtract(point, shape.base), shape.axis) / shape.axis_squared)
-        ends = sorted(abs(h) * shape.axis_length for h in (height, height - 1))
-        if ends[0] > 1e-25:
-            return ends[0]
-        start, end = map(as_float, shape.radii)
-        return abs(start + (end - start) * height - off_axis(shape, point))
-    if isinstance(shape, exact.Paraboloid) and shape.has_end():
-        below = abs(as_float((shape.end - dot(subtract(point, shape.center), shape.axis)) / shape.unit))
-        if below > 1e-25:
-            return below
-        return abs(2 * sqrt(as_float(shape.focal_length * shape.end / shape.unit)) - off_axis(shape, point))
-    return inf
-
-
-class Crossing:
-    """The first hit of a beam on a thing, at `t` to the best of knowledge, between low and high. If it is missed, low is
-    infinite, and if that is open, high is."""
-
-    def __init__(self, low=inf, t=None, high=inf):
-        self.low, self.t, self.high = low, t, high
-
-
-def flat_crossing(thing, beam, rounding):
-    shape, ray = thing.shape, beam.ray
-    if beam.left is thing:
-        return Crossing()
-    along = dot(shape.direction, ray.direction)
-    if along == 0:
-        return Crossing()
-    t = dot(shape.direction, subtract(shape.center, ray.origin)) / along
-    far = abs(as_float(t)) * ray.scale
-    cosine = abs(as_float(along)) / length(shape.direction) / ray.scale
-    magnitude = beam.magnitude + shape.distance(ray) + shape.size
-    slack = rounding.displacement * rounding.u * magnitude + beam.off + beam.turn * far
-    middle_t, spread = as_float(t), slack / cosine / ray.scale
-    if middle_t + spread <= 0:
-        return Crossing()
-    if not rim_is_clear(shape, ray, t, slack / cosine):
-        return Crossing(middle_t - spread)
-    if not shape.crossings(ray):
-        return Crossing()
-    if middle_t - spread <= 0:
-        return Crossing(middle_t - spread)
-    return Crossing(middle_t - spread, t, middle_t + spread)
-
-
-def rim_is_clear(shape, ray, t, slack):
-    if isinstance(shape, exact.Disc):
-        return abs(sqrt(as_float(shape.off(ray, t))) - shape.radius) > slack
-    if not isinstance(shape, exact.Triangle):
-        return True
-    sides = set()
-    for edge, side in zip(shape.edges(ray), shape.sides):
-        across = length(cross(side, ray.direction))
-        if across > 0 and abs(as_float(edge)) > slack * across:
-            sides.add(edge > 0)
-        else:
-            sides.add(None)
-    return {True, False} <= sides or None not in sides
-
-
-def solid_crossing(thing, beam, rounding):
-    shape, ray = thing.shape, beam.ray
-    distance = shape.distance(ray)
-    magnitude = beam.magnitude + distance + shape.size
-    slack = rounding.displacement * rounding.u * magnitude + beam.off + beam.turn * magnitude
-    infinite = isinstance(shape, exact.DoubleCone) or getattr(shape, "infinite", False)
-    if not infinite:
-        toward = [as_float(x) for x in subtract(shape.center, ray.origin)]
-        way = [as_float(x) / ray.scale for x in ray.direction]
-        along = dot(toward, way)
-        if sum((x - along * y) ** 2 for x, y in zip(toward, way)) > (1.001 * shape.size + 2 * slack) ** 2:
-            return Crossing()
-    start = fmpq(0)
-    if beam.left is thing:
-        # where it leaves, each of the three surfaces is crossed within a little of the others
-        bend = curvature(thing, ray.origin)
-        if beam.cosine**2 <= 16 * slack * bend or beam.cosine == 0:
-            return Crossing(0.0)
-        start = rational(4 * slack / beam.cosine / ray.scale)
-    firsts = []
-    for by in (0.0, slack, -slack):
-        surface = grown(shape, by) if by else shape
-        firsts.append(next((t for t in surface.crossings(ray) if t > start), None))
-    places = [as_float(t) for t in firsts if t is not None]
-    if not places:
-        return Crossing()
-    if len(places) < 3:
-        return Crossing(min(places))
-    return Crossing(min(places), firsts[0], max(places))
-
-
-def crossing(thing, beam, rounding):
-    kind = flat_crossing if isinstance(thing.shape, exact.Plane) else solid_crossing
-    return kind(thing, beam, rounding)
+    if not (is_flat(thing) or isinstance(shape, exact.DoubleCone) or getattr(shape, "infinite", False)):
+        toward, way = exact.floats(subtract(shape.center, ray.origin)), exact.floats(ray.direction)
+        along = dot(toward, way) / ray.scale
+        if dot(toward, toward) - along * along > 1.001 * shape.size**2:
+            return None
+    return next((t for t in shape.crossings(ray) if t > start), None)
 
 
 class Hit:
-    """A surface as a beam hits it. off: how far the place, turn: how far the unit normal may be off."""
+    """A surface as a ray hits it. The normals are those of the side that the ray comes from."""
 
-    def __init__(self, thing, index, met, beam, rounding):
-        shape, ray = thing.shape, beam.ray
-        self.thing, self.index, self.t = thing, index, met.t
-        self.low, self.high = met.low, met.high
-        self.point = [middle(x) for x in ray.at(met.t)]
-        along = max(met.high - as_float(met.t), as_float(met.t) - met.low) * ray.scale
-        far = as_float(met.t) * ray.scale
-        self.magnitude = beam.magnitude + far + shape.distance(ray) + shape.size
-        self.off = along + beam.off + beam.turn * far + rounding.u * self.magnitude
-        self.bend = curvature(thing, self.point)
-        self.turn = self.bend * self.off + rounding.arithmetic * rounding.u
-        outward = thing.outward(self.point)
-        self.against = dot(outward, ray.direction) < 0
-        flat = isinstance(shape, exact.Plane)
-        self.entering = self.against if flat else not shape.contains(ray.at(met.t - TINY))
-        self.facing = outward if self.against else times(outward, -1)
+    def __init__(self, scene, index, ray, t):
+        self.index, self.thing = index, scene.things[index]
+        self.material = self.thing.material
+        self.point = [middle(arb(x)) for x in ray.at(t)]
+        outward = self.thing.outward(ray.at(t))
+        is_against = dot(outward, ray.direction) < 0
+        self.entering = is_against if is_flat(self.thing) else not self.thing.shape.contains(ray.at(t - TINY))
+        self.facing = outward if is_against else times(outward, -1)
         self.geometry = unit(self.facing)
-        shading = unit(thing.shading(self.point, outward))
-        if as_float(dot(shading, self.geometry)) < 0:
-            shading = times(shading, -1)
-        self.normal = shading
-        self.to_eye = times(unit(ray.direction), -1)
-        self.is_open = rim_distance(shape, self.point) <= 2 * self.off or self.turn > 0.1
+        self.normal = unit(self.thing.shading(self.point, outward))
+        if dot(self.normal, self.geometry) < 0:
+            self.normal = times(self.normal, -1)
+        self.direction = unit(ray.direction)
+        self.to_eye = times(self.direction, -1)
+        self.base = checker_color(self) if self.material.checker else self.material.color
 
 
-def nearest(scene, beam, rounding):
-    """Returns the hit, None for a miss, or "open"."""
-    met = [crossing(thing, beam, rounding) for thing in scene.things]
-    first = min(range(len(met)), key=lambda i: (met[i].high, met[i].low), default=None)
-    if first is None:
+def nearest(scene, ray, start):
+    """Returns the first hit beyond the start, or None. An opaque surface covers a transparent one that coincides with it."""
+    met = [(first_crossing(thing, ray, start), index) for index, thing in enumerate(scene.things)]
+    hits = [(t, scene.things[index].material.transmission > 0, index) for t, index in met if t is not None]
+    if not hits:
         return None
-    if any(i != first and m.low < met[first].high for i, m in enumerate(met)):
-        return "open"
-    if met[first].low == inf:
-        return None
-    if met[first].high == inf:
-        return "open"
-    hit = Hit(scene.things[first], first, met[first], beam, rounding)
-    return "open" if hit.is_open else hit
+    t, _, index = min(hits)
+    return Hit(scene, index, ray, t)
 
 
-def leaving(hit, direction, turn, rounding):
-    """Returns a beam from a hit, which renderers start off the surface by a few of the hit's errors."""
-    start = hit.off + 48 * rounding.u * hit.magnitude
-    cosine = abs(as_float(dot(hit.geometry, unit(direction))))
-    return Beam(hit.point, [middle(x) for x in direction], start, turn, hit.thing, cosine, hit.magnitude)
-
-
-class Sum:
-    """A color as balls, with a bound on the error of its three channels."""
-
-    def __init__(self, color=(0, 0, 0), error=0.0):
-        self.color, self.error = [arb(x) for x in color], error
-
-    def add(self, color, error):
-        self.color, self.error = add(self.color, color), self.error + error
-
-
-def checker_color(hit, rounding, eye):
-    """Returns the color of the place's square, or None if a border is too near to decide."""
-    material, kind = hit.thing.material, hit.thing.kind
-    point = [arb(p + e) for p, e in zip(hit.point, eye)]
-    if kind in ("plane", "disc"):
+def checker_color(hit):
+    """Returns the color of the place's square."""
+    material = hit.material
+    if hit.thing.kind in ("plane", "disc"):
         normal = unit(hit.thing.shape.direction)
-        sizes = [abs(as_float(x)) for x in normal]
+        sizes = [abs(float(fraction(x))) for x in normal]
         axis = [arb(int(k == sizes.index(min(sizes)))) for k in range(3)]
         first = unit(subtract(axis, times(normal, dot(axis, normal))))
-        places = [dot(point, first), dot(point, cross(normal, first))]
+        places = [dot(hit.point, first), dot(hit.point, cross(normal, first))]
     else:
-        places = subtract(point, times(hit.geometry, arb(material.square) / 1024))
-    squares, square = 0, as_float(material.square)
-    for place in places:
-        cell = as_float(place / material.square)
-        # the eye's place among the squares has its own rounding, of up to two squares
-        slack = (2 * hit.off + rounding.arithmetic * rounding.u * hit.magnitude) / square
-        if abs(cell - round(cell)) <= slack + rounding.arithmetic * rounding.u * 2:
-            return None
-        squares += floor(cell)
-    return material.checker[squares % 2]
+        places = subtract(hit.point, times(hit.geometry, arb(material.square) / 1024))
+    return material.checker[sum(floor(fraction(place / material.square)) for place in places) % 2]
 
 
-def spot_strength(light, from_light, turn, rounding):
-    """Returns (strength, error), or None on a hard edge."""
+def spot_strength(light, from_light):
     versine = 1 - dot(unit(light.direction), unit(from_light))
     outer, inner = (1 - (arb(rational(a)) * arb.pi() / 180).cos() for a in (light.angle, light.angle - light.penumbra))
-    s = as_float(versine)
-    error = sqrt(2 * s) * turn + turn * turn + rounding.arithmetic * rounding.u * s
-    if min(abs(s - as_float(edge)) for edge in (inner, outer)) <= error and light.penumbra == 0:
-        return None
-    if versine > outer:
-        return arb(0), error if s - as_float(outer) <= error else 0.0
-    if versine <= inner:
-        return arb(1), 0.0 if as_float(inner) - s > error else 1.5 * error / as_float(outer - inner)
-    x = (outer - versine) / (outer - inner)
-    relative = rounding.arithmetic * rounding.u
-    return x * x * (3 - 2 * x), 1.5 * error / as_float(outer - inner) + relative
+    if versine >= outer:
+        return arb(0)
+    x = (outer - versine) / (outer - inner) if versine > inner else arb(1)
+    return x * x * (3 - 2 * x)
 
 
-def passing(scene, hit, way, end, turn, rounding):
-    """Returns the parts of a light's channels that get through, or None if that is open."""
-    beam = leaving(hit, way, turn, rounding)
-    lift = hit.thing.lift(hit.point, hit.facing)
+def passing(scene, hit, way, is_infinite):
+    """Returns the part of each channel of a light that gets through."""
+    start, sinks, lift = hit.point, dot(hit.geometry, way) <= 0, hit.thing.lift(hit.point, hit.facing)
     if lift is not None:
-        start = [middle(p + x) for p, x in zip(hit.point, lift)]
-        if end != inf:
-            way = subtract(add(hit.point, way), start)
-        # a place moves a vertex's share and its height
-        shape = hit.thing.shape
-        off = beam.off * (2 + 3 * shape.size**2 / length(shape.direction))
-        sinks = as_float(dot(hit.geometry, unit(way))) <= turn
-        beam = Beam(start, [middle(x) for x in way], off, turn, None if sinks else hit.thing, 1.0, hit.magnitude)
-    parts, is_open = [arb(1)] * 3, False
+        start = add(hit.point, lift)
+        way = way if is_infinite else subtract(way, lift)
+    ray, parts = ray_from(start, way), [arb(1)] * 3
     for thing in scene.things:
-        met = crossing(thing, beam, rounding)
-        if met.low >= end:
-            continue
-        if met.high >= end:
-            is_open = True
-        else:
-            parts = [part * passed for part, passed in zip(parts, thing.material.filter)]
-            if all(part == 0 for part in parts):
-                return parts
-    return None if is_open else parts
+        t = first_crossing(thing, ray, TINY)
+        is_passed = t is not None and (is_infinite or t < 1)
+        if thing is hit.thing and is_flat(thing):
+            is_passed = sinks and (lift is None or is_passed)
+        if is_passed:
+            parts = channels(parts, thing.material.filter)
+    return parts
 
 
-def highlight(hit, to_light, facing, facing_error, turn, rounding):
-    """Returns (R . V)^shininess and its error."""
-    exponent = hit.thing.material.shininess
-    power = as_float(exponent)
-    if power == 0:
-        return arb(1), 0.0
-    mirrored = subtract(times(hit.normal, 2 * facing), to_light)
-    alignment = dot(mirrored, hit.to_eye)
-    spread = 2 * facing_error + 2 * as_float(facing) * hit.turn + turn + 2 * rounding.arithmetic * rounding.u
-    cosine = as_float(alignment)
-    change = sqrt(max(1 - cosine * cosine, 0.0)) * spread + spread * spread + rounding.arithmetic * rounding.u
-    if cosine + change <= 0:
-        return arb(0), 0.0
-    nearest_cosine = min(cosine + change, 1.0)
-    if cosine <= change:
-        return (arb(alignment) ** arb(exponent) if cosine > 0 else arb(0)), nearest_cosine**power
-    value = (exponent * alignment.log()).exp()
-    relative = rounding.arithmetic * rounding.u * (1 + power * abs(log(min(cosine, 1.0))))
-    return value, power * nearest_cosine ** (power - 1) * change + as_float(value) * relative
+def highlight(hit, to_light, facing):
+    """Returns max(0, R . V)^shininess."""
+    exponent = hit.material.shininess
+    alignment = dot(subtract(times(hit.normal, 2 * facing), to_light), hit.to_eye)
+    if exponent == 0:
+        return arb(1)
+    return (exponent * alignment.log()).exp() if alignment > 0 else arb(0)
 
 
-def lit(scene, light, hit, base, rounding, total):
-    """Adds what a light gives. Returns whether the place is in its shadow, or None if that is open."""
-    u, material = rounding.u, hit.thing.material
-    infinite = light.kind == "directional"
-    way = times(light.direction, -1) if infinite else subtract(light.position, hit.point)
+def lit(scene, light, hit):
+    """Returns the color that a light adds, or None if the light does not reach the surface."""
+    is_infinite = light.kind == "directional"
+    way = times(light.direction, -1) if is_infinite else subtract(light.position, hit.point)
     to_light = unit(way)
-    turn = 4 * u + (0.0 if infinite else hit.off / length(way))
     facing = dot(hit.normal, to_light)
-    facing_error = hit.turn + turn + rounding.arithmetic * u
-    if abs(as_float(facing)) <= facing_error:
+    if facing <= 0:
         return None
-    if facing < 0:
-        return True
-    strength, strength_error = arb(1), 0.0
-    if light.kind == "spot":
-        spot = spot_strength(light, times(way, -1), turn, rounding)
-        if spot is None:
-            return None
-        strength, strength_error = spot
-        if strength == 0:
-            return True if strength_error == 0 else None
+    strength = spot_strength(light, times(way, -1)) if light.kind == "spot" else arb(1)
     if light.fading != [1, 0, 0]:
         distance = arb(dot(way, way)).sqrt()
-        fading = 1 / (light.fading[0] + distance * (light.fading[1] + distance * light.fading[2]))
-        off = 2.1 * hit.off / length(way) + rounding.arithmetic * u
-        strength, strength_error = strength * fading, (strength_error + off) * as_float(fading)
-    parts = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
-    if parts is None:
+        strength /= light.fading[0] + distance * (light.fading[1] + distance * light.fading[2])
+    parts = passing(scene, hit, way, is_infinite) if strength > 0 else [arb(0)]
+    if not any(part > 0 for part in parts):
         return None
-    if all(part == 0 for part in parts):
-        return True
-    shine, shine_error = highlight(hit, to_light, facing, facing_error, turn, rounding)
-    color, errors = [], []
-    for k in range(3):
-        surface = material.diffuse[k] * base[k] * facing + material.specular[k] * shine
-        error = as_float(material.diffuse[k] * base[k]) * facing_error + as_float(material.specular[k]) * shine_error
-        reached = light.color[k] * strength * parts[k]
-        color.append(reached * surface)
-        errors.append(
-            as_float(reached) * error
-            + as_float(light.color[k] * surface * parts[k]) * strength_error
-            + rounding.arithmetic * u * as_float(reached * surface)
-        )
-    total.add(color, max(errors))
-    return False
+    diffuse = times(channels(hit.material.diffuse, hit.base), facing)
+    surface = add(diffuse, times(hit.material.specular, highlight(hit, to_light, facing)))
+    return times(channels(channels(light.color, parts), surface), strength)
 
 
-def refracted(hit, direction, rounding):
-    """Returns (direction, how far it may be turned per turn of ray and normal), (None, 0) at total reflection, None if open."""
-    ior = arb(hit.thing.material.ior)
+def mirrored(hit):
+    """Returns the direction of the reflected ray. If a smooth triangle's normal sends it to the wrong side, that is the
+    geometric normal's."""
+    ways = [subtract(hit.direction, times(n, 2 * dot(hit.direction, n))) for n in (hit.normal, hit.geometry)]
+    return ways[0] if dot(ways[0], hit.geometry) > 0 else ways[1]
+
+
+def refracted(hit):
+    """Returns the direction of the refracted ray, or None at total reflection."""
+    ior = arb(hit.material.ior)
     eta = 1 / ior if hit.entering else ior
-    cosine = -dot(direction, hit.normal)
-    squared = 1 - eta * eta * (1 - cosine * cosine)
-    band = rounding.arithmetic * rounding.u + 2 * as_float(eta) ** 2 * (hit.turn + rounding.u)
-    if abs(as_float(squared)) <= 16 * band:
-        return None
-    if squared < 0:
-        return None, 0.0
-    root = squared.sqrt()
-    passed = add(times(direction, eta), times(hit.normal, eta * cosine - root))
-    gain = as_float(eta + abs(eta * cosine - root) + eta * eta * cosine / root)
-    return passed, gain
+    for normal in (hit.normal, hit.geometry):
+        cosine = -dot(hit.direction, normal)
+        squared = 1 - eta * eta * (1 - cosine * cosine)
+        if squared < 0:
+            return None
+        way = add(times(hit.direction, eta), times(normal, eta * cosine - squared.sqrt()))
+        if dot(way, hit.geometry) < 0:
+            return way
+    return None
 
 
-def reflectance(hit, cosine):
+def reflectance(hit):
     """Returns the part of unpolarized light that the surface reflects, by Fresnel's equations."""
-    ior = arb(hit.thing.material.ior)
-    entering = hit.entering or hit.thing.material.transmission == 0
-    there = 1 / ior if entering else ior  # the sine behind the surface over that before it
-    squared = 1 - there * there * (1 - cosine * cosine)
-    if squared <= 0:
+    cosine, ior = dot(hit.to_eye, hit.normal), arb(hit.material.ior)
+    near, far = (arb(1), ior) if hit.entering or hit.material.transmission == 0 else (ior, arb(1))
+    sine_squared = near * near / (far * far) * (1 - cosine * cosine)
+    if sine_squared >= 1:
         return arb(1)
-    behind = squared.sqrt()
-    near, far = (arb(1), ior) if entering else (ior, arb(1))
+    behind = (1 - sine_squared).sqrt()
     across = (near * cosine - far * behind) / (near * cosine + far * behind)
     along = (near * behind - far * cosine) / (near * behind + far * cosine)
     return (across * across + along * along) / 2
 
 
-def reflectance_bounded(hit, direction, turn, rounding):
-    """Returns (reflectance, how far a turn of ray and normal may change it)."""
-    cosine = -dot(direction, hit.normal)
-    part = reflectance(hit, cosine)
-    change = max(abs(as_float(reflectance(hit, cosine + way * arb(turn)) - part)) for way in (-1, 1))
-    return part, 2 * change + rounding.arithmetic * rounding.u
-
-
-class Answer:
-    """hit: of the first surface, None, or "open"; shadows: of each light True, False or None; color: None where it is
-    open."""
-
-    def __init__(self, hit=None, shadows=(), color=None):
-        self.hit, self.shadows, self.color = hit, shadows, color
-
-
-def trace(scene, beam, rounding, bounces):
-    hit = nearest(scene, beam, rounding)
-    if hit is None:
-        return Answer(None, (), Sum(scene.background))
-    if hit == "open":
-        return Answer("open")
-    material, u = hit.thing.material, rounding.u
-    base = checker_color(hit, rounding, scene.eye) if material.checker else material.color
-    total = Sum()
-    total.add([i * material.ambient * c + e for i, c, e in zip(scene.ambient, base or scene.ambient, material.emission)], 0.0)
-    total.error = 3 * rounding.arithmetic * u * max(as_float(x) for x in total.color)
-    shadows = [lit(scene, light, hit, base or material.color, rounding, total) for light in scene.lights]
-    if None in shadows or base is None:
-        return Answer(hit, shadows)
-    if bounces > 0 and not follow(scene, hit, beam, rounding, bounces, total):
-        return Answer(hit, shadows)
-    total.error += rounding.arithmetic * u * max(as_float(x) for x in total.color)
-    return Answer(hit, shadows, total)
-
-
-def follow(scene, hit, beam, rounding, bounces, total):
-    """Adds the mirrored and the refracted ray's color. Returns False if that is open."""
-    material = hit.thing.material
-    direction = times(hit.to_eye, -1)
-    reflection, transmission = list(material.reflection), arb(material.transmission)
-    kept, part_error = arb(0), 0.0
-    if material.fresnel:
-        part, part_error = reflectance_bounded(hit, direction, beam.turn + hit.turn + rounding.u, rounding)
-        if transmission > 0:
-            kept, transmission = part * transmission, (1 - part) * transmission
-        else:
-            reflection = times(reflection, part)
-    own = rounding.arithmetic * rounding.u
+def split(hit, is_total):
+    """Returns the parts of the light, by channel, that the reflected and the refracted ray carry."""
+    material = hit.material
+    part = arb(1) if is_total else reflectance(hit) if material.fresnel else arb(0)
     if material.transmission > 0:
-        through = refracted(hit, direction, rounding)
-        if through is None:
-            return False
-        passed, gain = through
-        if passed is None:
-            kept, transmission = arb(material.transmission), arb(0)
-    mirrored = [arb(r) + kept for r in reflection]
-    filtered = [transmission * channel / material.transmission for channel in material.filter] if transmission != 0 else [arb(0)] * 3
-    for weights, kind in ((mirrored, "mirrored"), (filtered, "passed")):
-        if all(weight == 0 for weight in weights):
-            continue
-        if kind == "mirrored":
-            away = dot(direction, hit.normal)
-            way, turn = subtract(direction, times(hit.normal, 2 * away)), beam.turn + 2 * hit.turn + own
-        else:
-            way, turn = passed, gain * (beam.turn + hit.turn) + own
-        seen = trace(scene, leaving(hit, way, turn, rounding), rounding, bounces - 1)
-        if seen.color is None:
-            return False
-        color = [c * weight for c, weight in zip(seen.color.color, weights)]
-        largest = max(as_float(weight) for weight in weights)
-        error = (part_error + own * largest) * max(as_float(c) for c in seen.color.color)
-        total.add(color, largest * seen.color.error + error)
-    return True
+        return [r + part * material.transmission for r in material.reflection], times(material.filter, 1 - part)
+    return times(material.reflection, part if material.fresnel else 1), [arb(0)] * 3
+
+
+class Pixel:
+    """What a ray shows: the first object, whether each light fails to reach it, the signature of the ray's tree
+    (kernels/types.h), and the color."""
+
+    def __init__(self, scene, ray, bounces):
+        self.scene, self.object, self.shadows, self.path, self.color = scene, NONE, None, PATH_START, [arb(0)] * 3
+        self.follow(ray, fmpq(0), [arb(1)] * 3, bounces)
+
+    def show(self, color, weight):
+        self.color = add(self.color, channels(color, weight))
+
+    def sign(self, index, events):
+        self.path = (self.path ^ ((index + 1) % 2**32 * PATH_EVENTS + events)) * PATH_FACTOR % 2**32
+
+    def follow(self, ray, start, weight, bounces):
+        """Adds what a ray and its bounces show."""
+        scene, hit = self.scene, nearest(self.scene, ray, start)
+        if hit is None:
+            self.show(scene.background, weight)
+            self.sign(NONE, 0)
+            return
+        lights = [lit(scene, light, hit) for light in scene.lights]
+        if self.shadows is None:
+            self.object, self.shadows = hit.index, [color is None for color in lights]
+        material = hit.material
+        self.show(add(times(channels(scene.ambient, hit.base), material.ambient), material.emission), weight)
+        for color in lights:
+            self.show(color or [0] * 3, weight)
+        if bounces == 0:
+            self.sign(hit.index, 0)
+            return
+        passed = refracted(hit) if material.transmission > 0 else None
+        is_total = material.transmission > 0 and passed is None
+        reflected, through = (channels(weight, part) for part in split(hit, is_total))
+        reflects, refracts = (any(x > 0 for x in part) for part in (reflected, through))
+        self.sign(hit.index, EVENT_REFLECTED * reflects + EVENT_REFRACTED * refracts + EVENT_TOTAL * (reflects and is_total))
+        if reflects:
+            self.follow(ray_from(hit.point, mirrored(hit)), TINY, reflected, bounces - 1)
+        if refracts:
+            self.follow(ray_from(hit.point, passed), TINY, through, bounces - 1)

@@ -393,6 +393,38 @@ class Triangle(Plane):
         return [] if min(edges) < 0 < max(edges) else super().crossings(ray)
 
 
+def grown(shape, by):
+    """Returns the solid with its surface moved outward by so much, or inward below 0."""
+    if isinstance(shape, Sphere):
+        return Sphere(shape.center, Fraction(shape.radius) + Fraction(by))
+    if isinstance(shape, Box):
+        return Box([x - rational(by) for x in shape.low], [x + rational(by) for x in shape.high])
+    if isinstance(shape, Torus):
+        return Torus(shape.center, shape.major, shape.minor + rational(by), shape.axis)
+    if isinstance(shape, DoubleCone):
+        slope = float(fraction(shape.slope))
+        sine = slope / sqrt(1 + slope**2)
+        return DoubleCone(shape.center, shape.axis, shape.slope, -by / sine / length(shape.axis))
+    if isinstance(shape, Superellipsoid):
+        longer = [[x * (1 + rational(by / length(axis))) for x in axis] for axis in shape.axes]
+        return Superellipsoid(shape.center, longer, shape.exponent)
+    if isinstance(shape, Paraboloid):
+        # with its apex moved by s and its focal length f by g, the surface at height z moves by (f s + z g) /
+        # sqrt(f (f + z)): by as much at the apex and the rim, and by less between; an infinite one at its apex
+        height = shape.end / shape.unit
+        f, z = floats([shape.focal_length, height])
+        wider = 0 if shape.infinite else by * (sqrt(f * (f + z)) - f) / z
+        apex = [c - rational(by) / shape.unit * a for c, a in zip(shape.center, shape.axis)]
+        focal_length = shape.focal_length + rational(wider)
+        return Paraboloid(apex, shape.axis, focal_length, height + 2 * rational(by), shape.infinite, shape.caps)
+    ends = rational(by / shape.axis_length)
+    slope = (shape.radii[1] - shape.radii[0]) / rational(shape.axis_length)
+    wider = rational(by * sqrt(1 + float(fraction(slope)) ** 2))
+    radii = [shape.radii[0] + wider - slope * rational(by), shape.radii[1] + wider + slope * rational(by)]
+    base = [b - ends * a for b, a in zip(shape.base, shape.axis)]
+    return Revolution(base, [a * (1 + 2 * ends) for a in shape.axis], radii, shape.infinite, shape.caps)
+
+
 def shape_of(given):
     """Returns a shape by its numbers and flags, as answers.c prints them. The numbers are the doubles that its member of
     Object.as (host/scene/scene.h) begins with, in their order there."""

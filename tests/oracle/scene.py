@@ -1,33 +1,22 @@
 """Reads scenes for the oracle from the YAML of docs/scene-format.md, without meshes and images on surfaces.
 
-As docs/verify.md states, the eye is subtracted in double, then each number is rounded once to the precision. The rest is
-exact."""
-
-import struct
+The numbers are those of the file in double, and the rest is exact."""
 
 import exact
 from exact import dot, rational, subtract, vector
 from flint import arb
 
 
-def narrow(number):
-    """Returns the number rounded to float."""
-    return struct.unpack("f", struct.pack("f", number))[0]
-
-
 class Material:
-    def __init__(self, given, rounding):
+    def __init__(self, given):
         def number(name, default):
-            return rational(rounding(given.get(name, default)))
-
-        def color(values):
-            return [rational(rounding(x)) for x in values]
+            return rational(given.get(name, default))
 
         def channels(name, default):
             value = given.get(name, default)
-            return color(value if isinstance(value, list) else [value] * 3)
+            return vector(value if isinstance(value, list) else [value] * 3)
 
-        self.color = color(given.get("color", [1, 1, 1]))
+        self.color = vector(given.get("color", [1, 1, 1]))
         self.diffuse, self.specular = channels("diffuse", 1), channels("specular", 0)
         self.ambient, self.shininess = number("ambient", 1), number("shininess", 32)
         self.reflection, self.filter = channels("reflection", 0), channels("transmission", 0)
@@ -36,69 +25,61 @@ class Material:
         self.emission = channels("emission", 0)
         self.checker = None
         if "checker" in given:
-            self.checker = [color(c) for c in given["checker"]["colors"]]
-            self.square = rational(float(given["checker"].get("size", 1)))
+            self.checker = [vector(c) for c in given["checker"]["colors"]]
+            self.square = rational(given["checker"].get("size", 1))
 
 
 class Light:
-    def __init__(self, kind, given, rounding, from_eye):
+    def __init__(self, kind, given):
         self.kind = kind
         intensity = float(given.get("intensity", 1))
-        self.color = [rational(rounding(float(x) * intensity)) for x in given.get("color", [1, 1, 1])]
+        self.color = vector(float(x) * intensity for x in given.get("color", [1, 1, 1]))
         if kind != "directional":
-            self.position = from_eye(given["position"])
+            self.position = vector(given["position"])
         if kind != "point":
             there = given.get("direction") or [b - a for a, b in zip(given["position"], given["look_at"])]
-            self.direction = vector(float(x) for x in there)
+            self.direction = vector(there)
         falloff = given.get("falloff", {"constant": 1})
         falloff = {"quadratic": 1} if falloff == "inverse_square" else falloff
-        self.fading = [rational(rounding(float(falloff.get(name, 0)))) for name in ("constant", "linear", "quadratic")]
+        self.fading = [rational(falloff.get(name, 0)) for name in ("constant", "linear", "quadratic")]
         if kind == "spot":
             self.angle, self.penumbra = float(given["angle"]), float(given.get("penumbra", 0))
 
 
 class Thing:
-    """One object: its shape, from the eye, its material, and a smooth triangle's normals."""
+    """One object: its shape, its material, and a smooth triangle's normals."""
 
-    def __init__(self, kind, given, material, from_eye, rounding):
+    def __init__(self, kind, given, material):
         self.kind, self.material, self.normals = kind, material, None
-        self.shape = self.make(kind, given, from_eye, rounding)
+        self.shape = self.make(kind, given)
         if "normals" in given:
-            self.normals = [vector(float(x) for x in normal) for normal in given["normals"]]
+            self.normals = [vector(normal) for normal in given["normals"]]
 
-    def make(self, kind, given, from_eye, rounding):
-        def size(name):
-            return rounding(given[name])
-
-        def vector(name):
-            return [float(x) for x in given[name]]
-
+    def make(self, kind, given):
         if kind == "sphere":
-            return exact.Sphere(from_eye(given["center"]), size("radius"))
+            return exact.Sphere(given["center"], given["radius"])
         if kind == "plane":
-            return exact.Plane(from_eye(given["point"]), vector("normal"))
+            return exact.Plane(given["point"], given["normal"])
         if kind == "disc":
-            return exact.Disc(from_eye(given["center"]), vector("normal"), size("radius"))
+            return exact.Disc(given["center"], given["normal"], given["radius"])
         if kind == "box":
-            return exact.Box(from_eye(given["min"]), from_eye(given["max"]))
+            return exact.Box(given["min"], given["max"])
         if kind == "torus":
-            return exact.Torus(from_eye(given["center"]), size("major"), size("minor"), vector("axis"))
+            return exact.Torus(given["center"], given["major"], given["minor"], given["axis"])
         if kind == "triangle":
-            return exact.Triangle(*map(from_eye, given["vertices"]))
+            return exact.Triangle(*given["vertices"])
         if "from" in given:
-            base = from_eye(given["from"])
-            axis = subtract(from_eye(given["to"]), base)
+            base = vector(given["from"])
+            axis = subtract(vector(given["to"]), base)
             radii = given["radius"] if kind == "cone" else [given["radius"]] * 2
-            return exact.Revolution(base, axis, map(rounding, radii), caps=given.get("caps", True))
+            return exact.Revolution(base, axis, radii, caps=given.get("caps", True))
         if kind == "cylinder":
-            return exact.Revolution(from_eye(given["point"]), vector("axis"), [size("radius")] * 2, infinite=True)
+            return exact.Revolution(given["point"], given["axis"], [given["radius"]] * 2, infinite=True)
         if kind != "cone":
             raise ValueError(f"the oracle knows no {kind}")
-        if "slope" in given:
-            slope = rational(given["slope"])
-        else:
-            slope = exact.middle((arb(rational(float(given["angle"]))) * arb.pi() / 180).tan())
-        return exact.DoubleCone(from_eye(given["apex"]), vector("axis"), slope)
+        # the slope of a scene is a double
+        slope = float(exact.fraction((arb(given["angle"]) * arb.pi() / 180).tan()))
+        return exact.DoubleCone(given["apex"], given["axis"], slope)
 
     def outward(self, point):
         """Returns the geometric normal, of any length."""
@@ -144,23 +125,11 @@ def unit(values):
 
 
 class Scene:
-    def __init__(self, given, rounding):
-        """given: what a scene file says. rounding: to the precision."""
-        eye = [float(x) for x in given["camera"]["position"]]
-
-        def from_eye(point):
-            return vector(rounding(float(x) - e) for x, e in zip(point, eye))
-
-        materials = {name: Material(body, rounding) for name, body in given.get("materials", {}).items()}
-        self.eye = vector(eye)
-        self.ambient = [rational(rounding(x)) for x in given.get("ambient", [0, 0, 0])]
-        self.background = [rational(rounding(x)) for x in given.get("background", [0, 0, 0])]
-        self.lights = [
-            Light(kind, body, rounding, from_eye) for light in given.get("lights", []) for kind, body in light.items()
+    def __init__(self, given):
+        """given: what a scene file contains."""
+        materials = {name: Material(body) for name, body in given["materials"].items()}
+        self.ambient, self.background = vector(given["ambient"]), vector(given["background"])
+        self.lights = [Light(kind, body) for light in given["lights"] for kind, body in light.items()]
+        self.things = [
+            Thing(kind, body, materials[body["material"]]) for entry in given["objects"] for kind, body in entry.items()
         ]
-        self.things = []
-        for entry in given["objects"]:
-            for kind, body in entry.items():
-                name = body.get("material", {})
-                material = Material(name, rounding) if isinstance(name, dict) else materials[name]
-                self.things.append(Thing(kind, body, material, from_eye, rounding))
