@@ -158,7 +158,7 @@ static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
 
 static void pixel_print(const Scene *scene, unsigned bounce_count, const ReferenceRay *ray)
 {
-    bool *shadows = memory_allocate_zeroed(scene->lights.count, sizeof *shadows);
+    OWNED bool *shadows = memory_allocate_zeroed(scene->lights.count, sizeof *shadows);
     const ReferenceScene world = {*scene, NULL};
     const ReferencePixel pixel =
         reference_pixel(&world, ray, &(ReferencePath){.bounce_count = bounce_count}, shadows);
@@ -172,12 +172,11 @@ static void pixel_print(const Scene *scene, unsigned bounce_count, const Referen
     quad_print("y", ray->direction.y);
     quad_print("z", ray->direction.z);
     printf("}\n");
-    free(shadows);
 }
 
 static void images_print(unsigned width, unsigned height)
 {
-    ExactScene scenes[EXACT_SCENES_MAX];
+    static ExactScene scenes[EXACT_SCENES_MAX];
     const size_t count = exact_scenes_read(scenes);
     for (size_t i = 0; i < count; i++) {
         printf("{\"scene\": \"%s\", \"bounces\": %u}\n", scenes[i].name, scenes[i].bounce_count);
