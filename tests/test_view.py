@@ -191,7 +191,7 @@ class View(TestCase):
         window.saved()
         text = SCENE.replace("mesh.obj", "other.obj")
         write("scene.yaml", text)
-        window.line("^scene.yaml:5:.*other.obj: No such file")
+        window.line("^scene.yaml:5:.*other.obj.*No such file")
         write("other.obj", MESH.replace("1 1 0", "1.5 1 0"))
         window.shows_at_last(self.image_of(text))
 
