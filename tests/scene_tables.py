@@ -16,7 +16,7 @@ A section is a scene and the messages that it must get, each as `line:column: se
 `tests/scene_tables.py TABLE FOLDER` writes the scenes of a table as files, which fuzzers begin with."""
 import re
 import sys
-from collections import defaultdict, namedtuple
+from collections import namedtuple
 from pathlib import Path
 
 Scene = namedtuple("Scene", "name overrides content messages")
@@ -56,12 +56,14 @@ def scene_of(name, content, lines):
     return Scene(name, overrides, content.encode(errors="surrogateescape"), messages)
 
 
-def messages_of(errors):
-    """Returns the messages that the program printed, by file, without the lines that they quote."""
-    messages = defaultdict(list)
-    for file, place, text in re.findall(r"(?m)^(\S+?):(\d+:\d+:)? ((?:error|warning): .*)", errors):
-        messages[file].append(f"{place} {text}".lstrip())
-    return messages
+def messages_in(errors):
+    """Returns all messages that the program printed, without the lines that they quote."""
+    return re.findall("(?m)^\\S+: (?:error|warning): .*", errors)
+
+
+def messages_about(file, scene):
+    """Returns the messages that the scene must get from this file, as the program prints them."""
+    return [message if message.startswith("--set:") else f"{file}:{'' if message[0].isdigit() else ' '}{message}" for message in scene.messages]
 
 
 def write(table, folder):
