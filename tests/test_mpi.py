@@ -14,7 +14,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import BUILD, IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
+from glint import BUILD, IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TWO, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
 
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
               "OMPI_MCA_mpi_yield_when_idle": "1",  # ranks that wait leave the processor to other tests
@@ -263,8 +263,10 @@ class Mpi(TestCase):
         self.faults_build()
         options = f"{RENDER} -o ranks.npy --precision certified --device 0 --reference-device 1 --checkpoint saved"
         two = {"POCL_DEVICES": "'pthread pthread'"}
+        self.glint(options.partition(" --checkpoint")[0], env=TWO)  # else its launches for the passports fail before there is a checkpoint
         command, failing, other = (f"{faulty(two | faults)} {options}" for faults in ({}, FAILING, {"FAULT_REFERENCE": 1}))
         self.mpirun_each(failing, failing, status=2)
+        self.assertTrue(os.path.exists("saved"))
         process = self.mpirun_each(command, other, status=1)
         self.assertRegex(process.stderr, r"'saved' belongs to another image \(device: ")
         self.mpirun_each(command, command)
