@@ -56,11 +56,11 @@ class CommandFailure(TestCase):
     @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes")
     def test_crashes(self):
         """A driver that crashes is named with its call. If the output is complete, this is a warning."""
-        write("image.png", "")
         empty = {"XDG_CACHE_HOME": str(Path("cache").resolve()), "POCL_CACHE_DIR": str(Path("cache").resolve())}  # no program comes from it
         for call, status in ("clGetPlatformIDs", 2), ("clBuildProgram", 2), ("clWaitForEvents", 2), ("clGetProgramInfo", 0):
             for act, what in ("crash", "crashed"), ("abort", "aborted"), ("assertion", "aborted"):
                 with self.subTest(call=call, act=act):
+                    write("image.png", "")
                     warning = "" if status else "warning: "
                     self.ends(RENDER, faults(f"{call}@0 {act}") | empty, status, f"{warning}{call}: the OpenCL driver {what}")
                     self.assertEqual(file_size("image.png") > 0, status == 0)
