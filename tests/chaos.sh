@@ -6,4 +6,4 @@ is_sanitized && skip_all 'a sanitized build replaces the allocators and handlers
 unset OCL_ICD_VENDORS
 seconds=8
 ! is_long || seconds=55
-tools/chaos --seconds $seconds --glint "$GLINT"
+tools/chaos --seconds $seconds --glint "$GLINT" && tools/chaos --seconds 5 --only 'render plain' --glint "$GLINT" kills
