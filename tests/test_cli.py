@@ -204,7 +204,7 @@ class Trace(TestCase):
                   f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}},\n"
                   "  {sphere: {center: [2, 0, 0], radius: 1, material: {reflection: 0.1}}}]\n")  # with SPHERE's features
             command = f"render glass.yaml {SMALL} --precision certified -o glass.ppm"
-            self.refuses(command, f"'{refused}', which has no error bound") if refused else self.glint(command)
+            self.refuses(command, fr"certified has no error bounds for '{refused}' \(sphere on line 3\); use another precision") if refused else self.glint(command)
 
     def test_certified(self):
         """A hit, a miss and a hit beyond the end are certain. A hit at the end and a tangent are uncertain."""
@@ -252,7 +252,7 @@ class Reports(TestCase):
         self.assertEqual(process.stdout.splitlines(), [
             "sphere.yaml: 1 object, 2 lights, 1 material", "bad.yaml: 2 errors",
             "dark.yaml: 1 object, 0 lights, 1 material, 1 warning", "missing.yaml: 1 error"])
-        self.assertRegex(process.stderr, "(?ms)^bad.yaml:2:1: error.*^bad.yaml:1:9: error.*dark.yaml: warning: the scene has no lights")
+        self.assertRegex(process.stderr, "(?ms)^bad.yaml:1:9: error.*^bad.yaml:2:1: error.*dark.yaml: warning: the scene has no lights")
         self.assertEqual(self.glint("check sphere.yaml sphere.yaml").stdout.count("\n"), 2)
 
     def test_check(self):

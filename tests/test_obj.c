@@ -389,6 +389,9 @@ TEST(what_is_not_used_is_reported_once)
         "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 abc\nvt nan 0\nvt 0 1e31\nvn 0 inf "
         "0 abc\n"
         "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
+        "scene.yaml:4:18: warning: a.obj: 2 texture coordinates are not finite or too large "
+        "and are read as 0\n"
+        "scene.yaml:4:18: warning: a.obj: 1 normal is not finite or too large and is ignored\n"
         "a.mtl:2:4: warning: 'Kd' must be a number of at most 1e+30 in magnitude; the default is used\n"
         "a.mtl:3:6: warning: 'Ks' must be a number of at most 1e+30 in magnitude; the default is used\n"
         "a.mtl:4:4: warning: 'Ns' must be a number of at most 1e+30 in magnitude; the default is used\n"
@@ -398,9 +401,6 @@ TEST(what_is_not_used_is_reported_once)
         "a.mtl:8:4: warning: 'Tf' must be a number of at most 1e+30 in magnitude; the default is used\n"
         "a.mtl:9:1: warning: 'map_refl' is not supported and is ignored\n"
         "a.mtl:13:1: warning: 'Pr' is not supported and is ignored\n"
-        "scene.yaml:4:18: warning: a.obj: 2 texture coordinates are not finite or too large "
-        "and are read as 0\n"
-        "scene.yaml:4:18: warning: a.obj: 1 normal is not finite or too large and is ignored\n"
         "a.obj:3:11: warning: vertex colors are ignored; the material's color is used\n"
         "a.obj:5:9: warning: words after the last number of a row are ignored\n"
         "a.obj:10:1: warning: 'l' is not supported and is ignored\n"
@@ -434,11 +434,10 @@ TEST(missing_parts_are_dropped)
          "ignored\n",
          false, false},
         {CORNERS "f 1/1 2/2 3/99999999999\n",
-         "a.obj:4:13: warning: a face names texture coordinate 99999999999, but the file has only 0 before "
-         "the face; it "
-         "is ignored\n"
          "a.obj:4:9: warning: a face names texture coordinate 2 (counted from 1), but the file has only 0; "
-         "it is ignored\n",
+         "it is ignored\n"
+         "a.obj:4:13: warning: a face names texture coordinate 99999999999, but the file has only 0 before "
+         "the face; it is ignored\n",
          false, false},
         {CORNERS "vt 0 0\nf 1/1 2/2 3/1\n",
          "a.obj:5:9: warning: a face names texture coordinate 2 (counted from 1), but the file has only 1; "
@@ -464,8 +463,8 @@ TEST(files_have_each_message_once)
     for (int i = 0; i < 29; i++)
         text_appendf(&scene_text, "  - mesh: {file: a.obj}\n");
     text_appendf(&obj, "mtllib a.mtl\nusemtl red\n" FACE "f 1 1 1\n");
-    text_appendf(&expected, "a.mtl:2:4: warning: 'Kd' must be 0 or more, not -1; the default is used\n"
-                            "scene.yaml:4:18: warning: a.obj: 1 triangle has no area and is never hit\n");
+    text_appendf(&expected, "scene.yaml:4:18: warning: a.obj: 1 triangle has no area and is never hit\n"
+                            "a.mtl:2:4: warning: 'Kd' must be 0 or more, not -1; the default is used\n");
     for (int i = 0; i < 25; i++) {
         text_appendf(&obj, "word%d\n", i);
         if (i < 18)

@@ -205,7 +205,7 @@ TEST(names_given_twice_are_refused)
                    "forest.yaml:5:10: error: definition 'tree' is already given at parts/trees.yaml:6:3\n");
 }
 
-// Messages are in the order in which the mistakes are found.
+// Messages about the scene's file come first, in the order of its text, then others as they are found.
 TEST(messages_name_the_included_file)
 {
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: -1}\n"
@@ -214,6 +214,8 @@ TEST(messages_name_the_included_file)
     file_write("scene.yaml", "\n\n\n\ninclude: [parts/a.yaml, b.yaml]\n" CAMERA "objects: [sphere: {}]\n");
     check_messages(
         "scene.yaml", (const char *[]){"ambient=-1"}, 1,
+        "scene.yaml:7:19: error: the sphere lacks 'center'\n"
+        "scene.yaml:7:19: error: the sphere lacks 'radius'\n"
         "parts/a.yaml:4:1: error: there is no scene key 'purple'; the choices are include, "
         "camera, frames, fps, "
         "shutter, background, ambient, lights, materials, define, objects\n"
@@ -221,9 +223,7 @@ TEST(messages_name_the_included_file)
         "parts/a.yaml:2:41: error: 'radius' must be greater than 0, not '-1'\n"
         "parts/a.yaml:3:18: error: parts/lost.obj: cannot read the file: No such file or directory\n"
         "b.yaml:1:19: error: the sphere lacks 'center'\n"
-        "b.yaml:1:19: error: the sphere lacks 'radius'\n"
-        "scene.yaml:7:19: error: the sphere lacks 'center'\n"
-        "scene.yaml:7:19: error: the sphere lacks 'radius'\n");
+        "b.yaml:1:19: error: the sphere lacks 'radius'\n");
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: 1\n");
     file_write("b.yaml", "objects: {}\nlights: []\ndefine: []\nlights: []\n");
     check_messages("scene.yaml", NULL, 0,

@@ -21,7 +21,8 @@ void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 {
     OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
-    if (!report_repeats(&reader->report, NULL, 0, text)) report_warning(&reader->report, offset, "%s", text);
+    if (!report_repeats(&reader->report, MESSAGE_WARNING, NULL, 0, text))
+        report_warning(&reader->report, offset, "%s", text);
 }
 
 bool dat_expect(DatReader *reader, const char *keyword)

@@ -14,9 +14,11 @@ Report report_open(const Source *source, MessageList *messages)
     return (Report){.source = source, .messages = messages};
 }
 
-bool report_repeats(Report *report, const char *file, uint64_t place, const char *text)
+bool report_repeats(Report *report, MessageSeverity severity, const char *file, uint64_t place,
+                    const char *text)
 {
-    uint64_t hash = hash_bytes(HASH_START, &place, sizeof place);
+    uint64_t hash = hash_bytes(HASH_START, &severity, sizeof severity);
+    hash = hash_bytes(hash, &place, sizeof place);
     hash = hash_bytes(hash, file ? file : "", file ? strlen(file) + 1 : 1);
     hash = hash_bytes(hash, text, strlen(text));
     for (size_t i = 0; i < report->known_count; i++)
@@ -25,17 +27,11 @@ bool report_repeats(Report *report, const char *file, uint64_t place, const char
     return false;
 }
 
-static size_t *severity_count(Report *report, MessageSeverity severity)
-{
-    return severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
-}
-
-// Returns whether the next message of the severity is beyond the limit, and then counts it.
+// Counts a message and returns whether it is beyond the limit of its severity.
 static bool message_exceeds(Report *report, MessageSeverity severity)
 {
-    size_t *count = severity_count(report, severity);
-    *count += *count >= MESSAGES_MAX;
-    return *count > MESSAGES_MAX;
+    size_t *count = severity == MESSAGE_ERROR ? &report->error_count : &report->warning_count;
+    return (*count)++ >= MESSAGES_MAX;
 }
 
 static bool message_is_before(const Message *a, const Message *b)
@@ -62,9 +58,9 @@ static void last_message_sort(MessageList *list)
 static void message_add(Report *report, MessageSeverity severity, size_t offset, const char *text)
 {
     const Source *source = report->source;
-    if (report_repeats(report, source->file, offset, text)) return;
+    if (report_repeats(report, severity, source->file, offset, text) || message_exceeds(report, severity))
+        return;
     message_add_at(report->messages, severity, source, offset, "%s", text);
-    ++*severity_count(report, severity);
     const bool is_of_file = offset <= source->length || offset == MESSAGE_WHOLE_FILE;
     if (report->messages && source->file && is_of_file) last_message_sort(report->messages);
 }
@@ -72,7 +68,6 @@ static void message_add(Report *report, MessageSeverity severity, size_t offset,
 // Adds the formatted arguments after `format` of the function that uses it.
 #define REPORT(report, severity, offset, format)                                                             \
     do {                                                                                                     \
-        if (message_exceeds(report, severity)) break;                                                        \
         OWNED char *text = NULL;                                                                             \
         ARGUMENTS_FORMAT(text, format);                                                                      \
         message_add(report, severity, offset, text);                                                         \
@@ -110,15 +105,13 @@ void report_include(Report *report, Report *included)
     for (size_t i = 0; i < from->count; i++) {
         Message *message = &from->items[i];
         const uint64_t place = (uint64_t)message->line << 32 | message->column;
-        if (report_repeats(report, message->file, place, message->text) ||
-            message_exceeds(report, message->severity)) {
+        if (report_repeats(report, message->severity, message->file, place, message->text) ||
+            message_exceeds(report, message->severity))
             message_free(message);
-            continue;
-        }
-        array_push(*report->messages, *message);
-        ++*severity_count(report, message->severity);
+        else
+            array_push(*report->messages, *message);
     }
-    if (!report_repeats(report, included->source->file, 0, "")) // counted once for each file
+    if (!report_repeats(report, MESSAGE_WARNING, included->source->file, 0, "")) // counted once for each file
         report->warning_count += warnings_beyond_limit(included);
     free(from->items);
     *from = (MessageList){0};

@@ -1,4 +1,5 @@
-// Collects one reader's messages about its source, bounded in number and without repeats.
+// Collects one reader's messages about its source, bounded in number and without repeats. Those about the
+// source's file come first, in the order of its text, then those about other files, as they are found.
 #pragma once
 
 #include "host/base/message.h"
@@ -31,7 +32,8 @@ void report_warning(Report *report, size_t offset, const char *format, ...)
 
 // Returns whether a message at a place of a file repeats an earlier one, and remembers it. A source may name
 // another file in many places.
-bool report_repeats(Report *report, const char *file, uint64_t place, const char *text);
+bool report_repeats(Report *report, MessageSeverity severity, const char *file, uint64_t place,
+                    const char *text);
 
 // Returns whether the error limit is reached. A reader then stops, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);

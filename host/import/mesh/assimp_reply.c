@@ -177,7 +177,8 @@ static void messages_add(MeshDraft *draft, const ReplyLists *lists, uint64_t war
         else
             draft_warn(draft, "%s", message->text);
     }
-    if (warning_count > received_count && !report_repeats(report, draft->import->path, 0, ""))
+    if (warning_count > received_count &&
+        !report_repeats(report, MESSAGE_WARNING, draft->import->path, 0, ""))
         report->warning_count += (size_t)warning_count - received_count;
 }
 

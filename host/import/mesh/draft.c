@@ -23,7 +23,7 @@ static void draft_report(const MeshDraft *draft, MessageSeverity severity, const
 {
     const MeshImport *import = draft->import;
     const bool is_scene = import->offset == MESSAGE_WHOLE_FILE; // whose path the report adds
-    if (!report_repeats(import->report, import->path, severity, text))
+    if (!report_repeats(import->report, severity, import->path, 0, text))
         report_message(import->report, severity, import->offset, "%s%s%s", is_scene ? "" : import->path,
                        is_scene ? "" : ": ", text);
 }

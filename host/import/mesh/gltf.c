@@ -38,7 +38,7 @@ void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 
 void gltf_warn_once(Gltf *gltf, const GltfItem *item, const char *text)
 {
-    if (!report_repeats(&gltf->draft->report, NULL, 0, text))
+    if (!report_repeats(&gltf->draft->report, MESSAGE_WARNING, NULL, 0, text))
         draft_warn(gltf->draft, "%s: %s", item->path, text);
 }
 
