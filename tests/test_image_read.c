@@ -77,7 +77,7 @@ TEST(png_of_other_colors)
 
 // Writes a JPEG of 32 x 16 pixels, whose quarters have the gray levels 0, 80, 160 and 240 in reading order,
 // with application segments or other bytes before its image.
-static void jpeg_write(const char *path, const char *segments, size_t length, int pixel_format)
+static void jpeg_write(const char *path, const char *segments, size_t length, int pixel_format, int flags)
 {
     enum { WIDTH = 32, HEIGHT = 16 };
     uint8_t pixels[HEIGHT][WIDTH][4];
@@ -89,7 +89,7 @@ static void jpeg_write(const char *path, const char *segments, size_t length, in
     unsigned long count = 0;
     tjhandle encoder = tjInitCompress();
     assert_int_equal(tjCompress2(encoder, pixels[0][0], WIDTH, 4 * WIDTH, HEIGHT, pixel_format, &bytes,
-                                 &count, TJSAMP_444, 95, 0),
+                                 &count, TJSAMP_444, 95, flags),
                      0);
     OwnedText text = {0};
     text_append(&text, (const char *)bytes, 2); // start of image
@@ -109,7 +109,7 @@ TEST(jpeg_is_turned_upright)
         char segment[] = "\xFF\xE1\0\x22"
                          "Exif\0\0MM\0\x2A\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\0\0\0\0\0\0\0";
         segment[29] = (char)orientation;
-        jpeg_write("turned.jpg", segment, sizeof segment - 1, TJPF_RGBX);
+        jpeg_write("turned.jpg", segment, sizeof segment - 1, TJPF_RGBX, 0);
         OwnedImage image = image_read_file("turned.jpg");
         const bool is_upright = orientation < 5 || orientation > 8;
         assert_int_equal(image.width, is_upright ? 32 : 16);
@@ -137,12 +137,12 @@ static void check_refused(const char *bytes, size_t length, const char *reason)
 // image is refused.
 TEST(damaged_jpeg)
 {
-    jpeg_write("a.jpg", "", 0, TJPF_RGBX);
+    jpeg_write("a.jpg", "", 0, TJPF_RGBX, 0);
     OwnedImage expected = image_read_file("a.jpg");
     OwnedMessageList messages = {0};
     OwnedText text = {0};
     assert_true(text_read_file(&text, "a.jpg", &messages));
-    jpeg_write("a.jpg", "\xFF\xFE\0\2xy", 6, TJPF_RGBX);
+    jpeg_write("a.jpg", "\xFF\xFE\0\2xy", 6, TJPF_RGBX, 0);
     check_warning("a.jpg",
                   "'a.jpg': JPEG: Corrupt JPEG data: 2 extraneous bytes before marker 0xe0; the image "
                   "may be damaged");
@@ -154,17 +154,33 @@ TEST(damaged_jpeg)
     check_refused(text.items, 100, "JPEG: Premature end of JPEG file");
 }
 
+// An error that ends the image is refused, though the decoder warned before.
+TEST(jpeg_that_ends_after_a_warning)
+{
+    jpeg_write("a.jpg", "\xFF\xFE\0\2xy", 6, TJPF_RGBX, TJFLAG_PROGRESSIVE);
+    OwnedMessageList messages = {0};
+    OwnedText text = {0};
+    assert_true(text_read_file(&text, "a.jpg", &messages));
+    char *scan = memmem(text.items, text.count, "\xFF\xDA", 2);
+    assert_non_null(scan);
+    const size_t left = text.count - (size_t)(scan - text.items);
+    char *codes = memmem(scan, left, "\xFF\xC4", 2);
+    assert_non_null(codes);
+    memset(codes + 5, 0xFF, 16); // the numbers of Huffman codes
+    check_refused(text.items, text.count, "JPEG: Bogus Huffman table definition");
+}
+
 TEST(jpeg_of_other_colors)
 {
     static const char p3[] = "\xFF\xE2\0\x1A"
                              "ICC_PROFILE\0\1\1Display P3",
                       srgb[] = "\xFF\xE2\0\x14"
                                "ICC_PROFILE\0\1\1sRGB";
-    jpeg_write("a.jpg", p3, sizeof p3 - 1, TJPF_RGBX);
+    jpeg_write("a.jpg", p3, sizeof p3 - 1, TJPF_RGBX, 0);
     check_warning("a.jpg", "'a.jpg': JPEG: the color profile is ignored; the colors are taken for sRGB");
-    jpeg_write("a.jpg", srgb, sizeof srgb - 1, TJPF_RGBX);
+    jpeg_write("a.jpg", srgb, sizeof srgb - 1, TJPF_RGBX, 0);
     check_warning("a.jpg", NULL);
-    jpeg_write("a.jpg", "", 0, TJPF_CMYK);
+    jpeg_write("a.jpg", "", 0, TJPF_CMYK, 0);
     MessageList messages = {0};
     Image image;
     assert_false(image_read(&image, "a.jpg", NULL, &messages));

@@ -75,6 +75,26 @@ static void profile_check(const ImageFile *file)
         image_warn(file, "JPEG: the color profile is ignored; the colors are taken for sRGB");
 }
 
+// Pixels that the decoder does not set keep their bytes.
+static bool pixels_decode(tjhandle decoder, const ImageFile *file, const Image *image, uint8_t *bytes)
+{
+    return tjDecompress2(decoder, file->bytes, file->length, bytes, (int)image->width, 0, (int)image->height,
+                         TJPF_RGB, TJFLAG_ACCURATEDCT) == 0;
+}
+
+// Returns whether the decoder only warned and set each pixel of `bytes`. Its code for a fatal error after a
+// warning is that of the warning, so this decodes again over other bytes, which unset pixels keep.
+static bool error_is_warning(tjhandle decoder, const ImageFile *file, const Image *image,
+                             const uint8_t *bytes)
+{
+    const size_t count = (size_t)image->width * image->height * 3;
+    OWNED uint8_t *others = tjGetErrorCode(decoder) == TJERR_WARNING ? malloc(count) : NULL;
+    if (!others) return false;
+    memset(others, 0xFF, count);
+    pixels_decode(decoder, file, image, others);
+    return memcmp(bytes, others, count) == 0;
+}
+
 static bool jpeg_pixels(tjhandle decoder, Image *image, const ImageFile *file)
 {
     int width = 0, height = 0, sampling = 0, color_space = 0;
@@ -88,9 +108,8 @@ static bool jpeg_pixels(tjhandle decoder, Image *image, const ImageFile *file)
     const size_t count = (size_t)image->width * image->height * 3;
     OWNED uint8_t *bytes = calloc(count, 1);
     if (!bytes) return image_refuse(file, "the image does not fit into memory");
-    if (tjDecompress2(decoder, file->bytes, file->length, bytes, width, 0, height, TJPF_RGB,
-                      TJFLAG_ACCURATEDCT)) {
-        if (tjGetErrorCode(decoder) != TJERR_WARNING)
+    if (!pixels_decode(decoder, file, image, bytes)) {
+        if (!error_is_warning(decoder, file, image, bytes))
             return image_refuse(file, "JPEG: %s", tjGetErrorStr2(decoder));
         image_warn(file, "JPEG: %s; the image may be damaged", tjGetErrorStr2(decoder));
     }
