@@ -218,13 +218,13 @@ class Cutouts(TestCase):
         write("opaque.yaml", scene % "opaque")
         self.glint("check half.yaml")
         self.assertIn("the alpha of 'opaque.png' is 1 everywhere, so nothing is cut out", self.glint("check opaque.yaml").stderr)
-        self.refuses("render half.yaml -o a.npy --precision certified", "a material has a 'cutout', which has no error bound")
+        self.refuses("render half.yaml -o a.npy --precision certified", r"certified has no error bounds for 'cutout' \(sphere on line 3\)")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.glint("certify opaque.yaml --size 4x4" + (" --precision single" if not IS_LONG else ""))
         self.refuses("certify half.yaml", "the exact reference does not support cutouts, so this scene cannot be certified")
         write("bumps.yaml", scene.replace("image: %s.png, cutout: 0.5", "normal_map: half.png"))
         self.glint("check bumps.yaml")
-        self.refuses("render bumps.yaml -o a.npy --precision certified", "a material has a normal map, which has no error bound")
+        self.refuses("render bumps.yaml -o a.npy --precision certified", r"certified has no error bounds for normal maps \(sphere on line 3\)")
         self.refuses("certify bumps.yaml", "the exact reference does not support normal maps, so this scene cannot be certified")
 
 

@@ -414,7 +414,7 @@ class Test(TestCase):
             self.assertEqual(hit, [64 * row + column for row in range(8, 24) for column in range(24, 40)])
         write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         process = self.glint("render a.gltf --precision certified --size 8x8 -o a.npy", status=1)
-        self.assertIn("the camera has parallel rays, which has no error bound", process.stderr)
+        self.assertIn("certified has no error bounds for a camera with parallel rays", process.stderr)
 
     def test_formats_look_alike(self):
         """A smooth, textured square in four formats gives the same image with the same camera and lights."""

@@ -251,23 +251,23 @@ class Soft(TestCase):
         """Certified refuses an area, a lens, a panorama and parallel rays, whose errors have no bound."""
         camera = "camera: {{position: [0, 0, 5], look_at: [0, 0, 0]{}}}\nlights: [{}]\nobjects: []\n"
         point, command = "point: {position: [0, 5, 0]}", "render soft.yaml --size 8x8 --precision certified -o soft.npy"
-        for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "a light has an area, "),
-                                    (", aperture: 1", f"{{{point}}}", "the camera has an 'aperture', "),
-                                    (", height: 1", f"{{{point}}}", "the camera has parallel rays, "),
-                                    (", projection: equirectangular", f"{{{point}}}", "the camera is equirectangular, ")):
+        for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "lights with an area"),
+                                    (", aperture: 1", f"{{{point}}}", "a camera with an 'aperture'"),
+                                    (", height: 1", f"{{{point}}}", "a camera with parallel rays"),
+                                    (", projection: equirectangular", f"{{{point}}}", "an equirectangular camera")):
             write("soft.yaml", camera.format(key, light))
-            self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
+            self.refuses(command, f"certified has no error bounds for {message}; use another precision")
             if "projection" not in key:
                 self.refuses("certify soft.yaml --precision strict --size 8x8", "the exact reference does not support .*so this scene cannot be certified")
         write("soft.yaml", camera.format("", f"{{{point}}}") + "background: {horizon: 1, zenith: 1, light: true}\n")
-        self.refuses(command, "the sky is a light, which has no error bound")
+        self.refuses(command, "certified has no error bounds for a sky that is a light")
         write("soft.yaml", camera.format(", shift: [0, 5]", f"{{{point}}}"))
         self.refuses(command, "'shift' moves the middle of the frame to [0-9.]+ focal lengths from the eye, where certified has error bounds up to 4.33")
         ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}" + \
                 ", {{sphere: {{center: [3, 0, 0], radius: 1, material: {{reflection: 0.1}}}}}}]\n"
         for material, refused in (", material: ghost", True), ("", False):
             write("soft.yaml", camera.replace("objects: []\n", "").format("", f"{{{point}}}") + ghost.format(material))
-            self.refuses(command, "a material has 'shadow: false', which") if refused else self.glint(command)
+            self.refuses(command, "certified has no error bounds for 'shadow: false' \\(sphere on line 4\\); use another precision") if refused else self.glint(command)
 
     def test_far_focus(self):
         """A focal plane at infinity is that of the view's directions alone."""

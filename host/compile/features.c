@@ -22,7 +22,7 @@ static const FeatureSet light_features[] = {
     [LIGHT_SPOT] = FEATURE_SPOT_LIGHTS,
 };
 
-static FeatureSet material_features(const Material *material)
+FeatureSet material_features(const Material *material)
 {
     FeatureSet set = 0;
     if (material->checker.is_on) set |= FEATURE_CHECKERS;

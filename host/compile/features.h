@@ -23,4 +23,5 @@ typedef uint64_t FeatureSet;
 extern const char *const feature_names[FEATURE_COUNT]; // "SPHERES", …
 
 FeatureSet features_of(const Scene *scene);
+FeatureSet material_features(const Material *material);
 void features_write_prelude(Text *text, FeatureSet set); // `#define HAS_SPHERES 1` … one for each feature

@@ -5,7 +5,7 @@
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
-#include "host/scene/describe.h"
+#include "host/scene/mesh.h"
 #include <float.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -48,9 +48,8 @@ typedef struct {
 } Extreme;
 
 // Returns the shape of an object and its line. The caller frees it.
-static char *extreme_describe(const Scene *scene, const Extreme *extreme)
+static char *shape_and_line(const Scene *scene, const Object *object)
 {
-    const Object *object = extreme->object;
     const char *name = shape_names[object_shape(object)];
     if (object->line == 0) return memory_copy_text(name);
     if (object->file == 0) return text_format("%s on line %u", name, object->line);
@@ -74,8 +73,8 @@ void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSet
         if (reach > farthest.size) farthest = (Extreme){object, reach};
         if (width > 0 && width < smallest.size) smallest = (Extreme){object, width};
     }
-    OWNED char *farthest_name = extreme_describe(scene, &farthest),
-               *smallest_name = extreme_describe(scene, &smallest);
+    OWNED char *farthest_name = shape_and_line(scene, farthest.object),
+               *smallest_name = shape_and_line(scene, smallest.object);
     message_warning(
         messages,
         "the %s reaches %.3g from the eye, and the width of the %s is %.3g: precision %s may lose "
@@ -83,14 +82,34 @@ void sizes_check(const Scene *scene, const SceneExtent *extent, const CompileSet
         farthest_name, farthest.size, smallest_name, smallest.size, precision_names[settings->precision]);
 }
 
-static bool material_is_used(const Scene *scene, uint32_t material)
+// Returns the first object with a material that has the feature, or that casts no shadow for a feature of 0.
+static const Object *object_with(const Scene *scene, FeatureSet feature)
 {
+    OWNED bool *has_feature = memory_allocate(scene->materials.count, sizeof *has_feature),
+               *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        has_feature[i] = feature ? material_features(material) & feature : material->shadow == SHADOW_NONE;
+    }
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        for (size_t k = 0; k < object_primitive_count(scene, object); k++)
-            if (object_material(scene, object, k) == material) return true;
+        const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+        const uint32_t *of_triangles = mesh ? mesh_materials(mesh, object) : NULL;
+        if (!of_triangles && has_feature[object->material]) return object;
+        if (!of_triangles || is_done[object->as.mesh.index]) continue;
+        is_done[object->as.mesh.index] = true;
+        for (size_t k = 0; k < mesh->triangle_count; k++)
+            if (has_feature[of_triangles[k]]) return object;
     }
-    return false;
+    return NULL;
+}
+
+static bool refuse_unbounded(const Scene *scene, const char *what, const Object *object,
+                             MessageList *messages)
+{
+    OWNED char *name = object ? shape_and_line(scene, object) : NULL;
+    return message_error(messages, "certified has no error bounds for %s%s%s%s; use another precision", what,
+                         name ? " (" : "", name ? name : "", name ? ")" : "");
 }
 
 bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
@@ -99,35 +118,32 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         FeatureSet feature;
         const char *text;
     } unbounded[] = {
-        {FEATURE_FRESNEL, "a material has 'fresnel'"},
-        {FEATURE_CONDUCTORS, "a material has 'conductor'"},
-        {FEATURE_ABSORPTION, "a material has 'absorption'"},
-        {FEATURE_SKY_LIGHT, "the sky is a light"},
-        {FEATURE_AREA_LIGHTS, "a light has an area"},
-        {FEATURE_LENS, "the camera has an 'aperture'"},
-        {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},
-        {FEATURE_EQUIRECTANGULAR, "the camera is equirectangular"},
-        {FEATURE_CUTOUTS, "a material has a 'cutout'"},
-        {FEATURE_NORMAL_MAPS, "a material has a normal map"},
+        {FEATURE_FRESNEL, "'fresnel'"},
+        {FEATURE_CONDUCTORS, "'conductor'"},
+        {FEATURE_ABSORPTION, "'absorption'"},
+        {FEATURE_SKY_LIGHT, "a sky that is a light"},
+        {FEATURE_AREA_LIGHTS, "lights with an area"},
+        {FEATURE_LENS, "a camera with an 'aperture'"},
+        {FEATURE_ORTHOGRAPHIC, "a camera with parallel rays"},
+        {FEATURE_EQUIRECTANGULAR, "an equirectangular camera"},
+        {FEATURE_CUTOUTS, "'cutout'"},
+        {FEATURE_NORMAL_MAPS, "normal maps"},
     };
-    const FeatureSet features = settings->certifies ? features_of(scene) : 0;
+    if (!settings->certifies) return true;
+    const FeatureSet features = features_of(scene);
     for (size_t i = 0; i < COUNT_OF(unbounded); i++)
         if (features & unbounded[i].feature)
-            return message_error(messages,
-                                 "%s, which has no error bound: choose a precision other than certified",
-                                 unbounded[i].text);
+            return refuse_unbounded(scene, unbounded[i].text, object_with(scene, unbounded[i].feature),
+                                    messages);
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
-    if (settings->certifies && camera_direction_error(&basis) > CAMERA_DIRECTION_ERROR_MAX)
+    if (camera_direction_error(&basis) > CAMERA_DIRECTION_ERROR_MAX)
         return message_error(
             messages,
             "'shift' moves the middle of the frame to %.3g focal lengths from the eye, where "
-            "certified has error bounds up to %.3g: choose another precision",
+            "certified has error bounds up to %.3g; use another precision",
             vector_length(basis.middle), (double)CAMERA_DIRECTION_ERROR_MAX / CAMERA_SHIFT_ERROR - 1);
-    for (uint32_t i = 0; i < scene->materials.count && settings->certifies; i++)
-        if (scene->materials.items[i].shadow == SHADOW_NONE && material_is_used(scene, i))
-            return message_error(messages, "a material has 'shadow: false', which has no error bound: choose "
-                                           "a precision other than certified");
-    return true;
+    const Object *unshadowed = object_with(scene, 0);
+    return !unshadowed || refuse_unbounded(scene, "'shadow: false'", unshadowed, messages);
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const SceneExtent *extent,
