@@ -19,6 +19,7 @@ static const char *const extensions_read[] = {
 
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
+    if (item->is_wrong) return false;
     OWNED char *text = NULL;
     ARGUMENTS_FORMAT(text, format);
     gltf->has_failed |= !gltf->is_optional;
@@ -50,7 +51,7 @@ static const json_t *json_not_null(const json_t *json)
 
 GltfItem gltf_member(const GltfItem *item, const char *key)
 {
-    GltfItem member = {.json = json_not_null(json_object_get(item->json, key))};
+    GltfItem member = {.json = json_not_null(json_object_get(item->json, key)), .is_wrong = item->is_wrong};
     const int length =
         snprintf(member.path, sizeof member.path, "%s%s", item->path, item->path[0] ? "." : "");
     if (length < (int)sizeof member.path)
@@ -60,7 +61,7 @@ GltfItem gltf_member(const GltfItem *item, const char *key)
 
 static GltfItem gltf_any_element(const GltfItem *item, size_t index)
 {
-    GltfItem element = {.json = json_not_null(json_array_get(item->json, index))};
+    GltfItem element = {.json = json_not_null(json_array_get(item->json, index)), .is_wrong = item->is_wrong};
     const int length = snprintf(element.path, sizeof element.path, "%s", item->path);
     if (length < (int)sizeof element.path)
         snprintf(element.path + length, sizeof element.path - (size_t)length, "[%zu]", index);
@@ -75,6 +76,7 @@ static GltfItem item_of_type(Gltf *gltf, GltfItem item, json_type type)
     if (item.json && json_typeof(item.json) != type) {
         gltf_fails(gltf, &item, "must be %s", names[type]);
         item.json = NULL;
+        item.is_wrong = true;
     }
     return item;
 }
@@ -127,6 +129,14 @@ GltfItem gltf_extension(Gltf *gltf, const GltfItem *item, const char *name)
     return gltf_object(gltf, &extensions, name);
 }
 
+// Returns a number or a text as the file has it. The caller frees it.
+static char *json_describe(const json_t *json)
+{
+    const char *const kind = json_is_array(json) ? "an array" : json_is_object(json) ? "an object" : NULL;
+    char *text = kind ? NULL : json_dumps(json, JSON_ENCODE_ANY | JSON_REAL_PRECISION(6));
+    return text ? text : memory_copy_text(kind ? kind : "nothing");
+}
+
 static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t high, size_t *value)
 {
     // writers of floating-point numbers add a fraction of 0
@@ -135,18 +145,26 @@ static bool integer_read(Gltf *gltf, const GltfItem *item, size_t low, size_t hi
     const json_int_t number = json_is_integer(item->json) ? json_integer_value(item->json)
                               : is_whole                  ? (json_int_t)real
                                                           : -1;
-    if (!json_is_number(item->json) || number < 0 || (uint64_t)number < low || (uint64_t)number > high)
-        return gltf_fails(gltf, item, "must be an integer from %zu to %zu", low, high);
+    if (!json_is_number(item->json) || number < 0 || (uint64_t)number < low || (uint64_t)number > high) {
+        OWNED char *found = json_describe(item->json);
+        return gltf_fails(gltf, item, "must be an integer from %zu to %zu, not %.40s", low, high, found);
+    }
     *value = (size_t)number;
     return true;
 }
 
 static bool index_read(Gltf *gltf, const GltfItem *item, const char *array, size_t *index)
 {
-    const size_t count = gltf_count(gltf, array);
+    const GltfItem entries = gltf_root_array(gltf, array);
+    const size_t count = json_array_size(entries.json);
+    size_t found = 0;
     if (count == 0)
-        return !gltf->has_failed && gltf_fails(gltf, item, "refers to '%s', which the file lacks", array);
-    return integer_read(gltf, item, 0, count - 1, index);
+        return !entries.is_wrong && gltf_fails(gltf, item, "refers to '%s', which the file lacks", array);
+    if (!integer_read(gltf, item, 0, count - 1, &found)) return false;
+    if (!gltf_any_element(&entries, found).json)
+        return gltf_fails(gltf, item, "refers to %s[%zu], which is null", array, found);
+    *index = found;
+    return true;
 }
 
 bool gltf_integer(Gltf *gltf, const GltfItem *item, const char *key, size_t low, size_t high, size_t *value)
@@ -196,12 +214,13 @@ static bool extension_is_read(const char *name)
 }
 
 // Lists the extensions that are not read, up to NAMES_BYTES_MAX bytes.
-static Text extensions_unread(const json_t *list)
+static Text extensions_unread(Gltf *gltf, const GltfItem *list)
 {
     enum { NAMES_BYTES_MAX = 200 };
     Text names = {0};
-    for (size_t i = 0; i < json_array_size(list) && names.count < NAMES_BYTES_MAX; i++) {
-        const char *name = json_string_value(json_array_get(list, i));
+    for (size_t i = 0; i < json_array_size(list->json) && names.count < NAMES_BYTES_MAX; i++) {
+        const GltfItem item = item_of_type(gltf, gltf_any_element(list, i), JSON_STRING);
+        const char *name = json_string_value(item.json);
         if (name && !extension_is_read(name))
             text_appendf(&names, "%s%.60s", names.count > 0 ? ", " : "", name);
     }
@@ -211,14 +230,14 @@ static Text extensions_unread(const json_t *list)
 static bool extensions_check(Gltf *gltf)
 {
     const GltfItem required = gltf_root_array(gltf, "extensionsRequired");
-    OwnedText needed_names = extensions_unread(required.json);
+    OwnedText needed_names = extensions_unread(gltf, &required);
     if (needed_names.count > 0)
         return gltf_fails(gltf, &required, "has %s, which glint does not support; export the file without it",
                           text_c(&needed_names));
     gltf->is_optional = true;
     const GltfItem used = gltf_root_array(gltf, "extensionsUsed");
+    OwnedText used_names = extensions_unread(gltf, &used);
     gltf->is_optional = false;
-    OwnedText used_names = extensions_unread(used.json);
     if (used_names.count > 0)
         gltf_warn(gltf, &used, "has %s, which glint does not support; what they add is missing",
                   text_c(&used_names));
@@ -229,7 +248,7 @@ static bool asset_check(Gltf *gltf)
 {
     const GltfItem root = gltf_root(gltf), asset = gltf_object(gltf, &root, "asset");
     const GltfItem needed =
-        gltf_member(&asset, json_object_get(asset.json, "minVersion") ? "minVersion" : "version");
+        gltf_member(&asset, gltf_member(&asset, "minVersion").json ? "minVersion" : "version");
     const char *version = json_string_value(needed.json);
     if (!version) return gltf_fails(gltf, &needed, "is missing; glint reads glTF 2.0");
     return strcmp(version, "2.0") == 0 ||
@@ -246,7 +265,8 @@ static bool json_text_read(Gltf *gltf, const char *text, size_t length, size_t o
     gltf->root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
     // the position is past the faulty word
     const size_t position = error.position > 0 ? (size_t)error.position - 1 : 0;
-    if (!gltf->root) return draft_fails(gltf->draft, offset + position, "%s", error.text);
+    if (!gltf->root)
+        return draft_fails(gltf->draft, offset + position, "the JSON is malformed: %s", error.text);
     return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "the JSON text must be an object");
 }
 

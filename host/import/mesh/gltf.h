@@ -10,6 +10,7 @@
 // A value of the JSON text, NULL if it is missing, and its path for messages, such as "nodes[3].mesh".
 typedef struct {
     const json_t *json;
+    bool is_wrong; // it or what contains it is missing, because its type is wrong, which was reported
     char path[112];
 } GltfItem;
 
@@ -56,7 +57,7 @@ typedef struct {
 } Gltf;
 
 // Reports that the item must be or lacks something, which the message's verb begins. The report is an error,
-// or a warning while `is_optional` is set. Always returns false.
+// or a warning while `is_optional` is set. A wrong item gets no second report. Always returns false.
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
@@ -97,8 +98,9 @@ typedef struct {
     size_t count, width;
 } GltfNumbers;
 
-// Reads the accessor that a member names, of scalars or vectors of `width` components. Without the member the
-// number of rows is 0. Returns false with an error. The caller frees the rows in either case.
+// Reads the accessor that a member names: indices if `width` is 1, else an attribute, of `width`
+// components. Without the member the number of rows is 0. Returns false with an error. The caller frees the
+// rows in either case.
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width,
                         GltfNumbers *numbers);
 // Finds the bytes of the buffer view that a member names. Returns false with an error.

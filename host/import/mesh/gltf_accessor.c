@@ -96,8 +96,7 @@ static bool gltf_buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffe
     if (!uri.json && is_first && gltf->binary.bytes)
         *buffer = gltf->binary;
     else if (!text)
-        return !gltf->has_failed &&
-               gltf_fails(gltf, &uri, "is missing, so the file lacks the buffer's bytes");
+        return gltf_fails(gltf, &uri, "is missing, so the file lacks the buffer's bytes");
     else if (strncmp(text, "data:", 5) == 0 && !gltf_data_decode(&buffer->owned, text))
         return gltf_fails(gltf, &uri, "is not base64");
     else if (strncmp(text, "data:", 5) != 0 && !buffer_read_file(gltf, buffer, &uri))
@@ -237,7 +236,8 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
     of_values.count = of_indices.count;
     if (of_indices.count == 0 || component_size(of_indices.type) == 0 ||
         !gltf_member(&indices, "bufferView").json || !gltf_member(&values, "bufferView").json)
-        return gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
+        return !indices.is_wrong && !values.is_wrong &&
+               gltf_fails(gltf, &sparse, "lacks 'count', 'indices' or 'values'");
     if (!elements_find(gltf, &indices, &of_indices) || !elements_find(gltf, &values, &of_values))
         return false;
     for (size_t i = 0; i < of_indices.count; i++) {
@@ -252,22 +252,36 @@ static bool sparse_read(Gltf *gltf, const GltfItem *accessor, const Elements *el
     return true;
 }
 
-static bool elements_read(Gltf *gltf, const GltfItem *accessor, size_t width, Elements *elements)
+// Returns whether indices, of width 1, or an attribute may have the type.
+static bool component_fits(size_t type, size_t width)
+{
+    const bool fits_both = type == GLTF_UINT8 || type == GLTF_UINT16;
+    return fits_both ||
+           (width == 1 ? type == GLTF_UINT32 : type == GLTF_INT8 || type == GLTF_INT16 || type == GLTF_FLOAT);
+}
+
+static bool elements_read(Gltf *gltf, const GltfItem *accessor, const char *key, size_t width,
+                          Elements *elements)
 {
     static const char *const types[] = {NULL, "SCALAR", "VEC2", "VEC3"};
-    const GltfItem type = gltf_member(accessor, "type"), normalized = gltf_member(accessor, "normalized");
+    const GltfItem type = gltf_member(accessor, "type"), normalized = gltf_member(accessor, "normalized"),
+                   component = gltf_member(accessor, "componentType");
     const char *name = json_string_value(type.json);
     *elements = (Elements){.width = width, .is_normalized = json_is_true(normalized.json)};
     if (normalized.json && !json_is_boolean(normalized.json))
         return gltf_fails(gltf, &normalized, "must be true or false");
     if (!name || strcmp(name, types[width]) != 0)
-        return gltf_fails(gltf, &type, "must be '%s' here", types[width]);
+        return gltf_fails(gltf, &type, "must be '%s' for %s, not '%.20s'", types[width], key,
+                          name ? name : "");
     if (!gltf_integer(gltf, accessor, "componentType", GLTF_INT8, GLTF_FLOAT, &elements->type) ||
         !gltf_integer(gltf, accessor, "byteOffset", 0, size_max, &elements->offset) ||
         !gltf_integer(gltf, accessor, "count", 1, DRAFT_NONE - 1, &elements->count))
         return false;
-    return (elements->count > 0 && component_size(elements->type) > 0) ||
-           gltf_fails(gltf, accessor, "lacks 'count' or a valid 'componentType'");
+    if (elements->count == 0 || !component.json)
+        return gltf_fails(gltf, accessor, "lacks 'count' or 'componentType'");
+    return component_fits(elements->type, width) ||
+           gltf_fails(gltf, &component, "must be %s for %s, not %zu",
+                      width == 1 ? "5121, 5123 or 5125" : "5120 to 5123 or 5126", key, elements->type);
 }
 
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width, GltfNumbers *numbers)
@@ -278,7 +292,7 @@ bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_
     if (!gltf_index(gltf, item, key, "accessors", &index)) return false;
     if (index == SIZE_MAX) return true;
     const GltfItem accessor = gltf_entry(gltf, "accessors", index);
-    if (!elements_read(gltf, &accessor, width, &elements)) return false;
+    if (!elements_read(gltf, &accessor, key, width, &elements)) return false;
     if (gltf_member(&accessor, "bufferView").json && !elements_find(gltf, &accessor, &elements)) return false;
     gltf->element_count += elements.count;
     if (gltf->element_count > gltf->byte_count + ELEMENTS_MAX)

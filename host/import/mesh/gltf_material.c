@@ -84,6 +84,7 @@ static uint32_t gltf_image_add(Gltf *gltf, const GltfItem *image, TextureContent
     MeshDraft *draft = gltf->draft;
     const GltfItem uri = gltf_string(gltf, image, "uri");
     const char *text = json_string_value(uri.json);
+    if (uri.is_wrong) return 0;
     if (text && strncmp(text, "data:", 5) != 0) {
         OWNED char *path = gltf_path(gltf, &uri);
         if (!path)
@@ -116,14 +117,16 @@ static bool wrap_read(Gltf *gltf, const GltfItem *sampler, const char *key, Text
 
 static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place)
 {
-    enum { NEAREST = 9728 };
-    size_t index = SIZE_MAX;
+    enum { NEAREST = 9728, LINEAR };
+    size_t index = SIZE_MAX, filter = LINEAR;
     if (!gltf_index(gltf, texture, "sampler", "samplers", &index) || index == SIZE_MAX) return;
-    const GltfItem sampler = gltf_entry(gltf, "samplers", index), filter = gltf_member(&sampler, "magFilter");
+    const GltfItem sampler = gltf_entry(gltf, "samplers", index),
+                   filter_item = gltf_member(&sampler, "magFilter");
     wrap_read(gltf, &sampler, "wrapS", &place->wraps[0]);
     wrap_read(gltf, &sampler, "wrapT", &place->wraps[1]);
-    if (json_integer_value(filter.json) == NEAREST)
-        gltf_warn_once(gltf, &filter,
+    gltf_integer(gltf, &sampler, "magFilter", NEAREST, LINEAR, &filter);
+    if (filter == NEAREST)
+        gltf_warn_once(gltf, &filter_item,
                        "filtering by the nearest texel is not supported; texels are interpolated");
 }
 
@@ -235,8 +238,8 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
     }
     if (vector_is_zero(emission)) return;
     // an emissive texture is shown if it is the only texture or the same as the base color texture
-    const json_t *emissive = json_object_get(surface->emissive_texture.json, "index"),
-                 *base_color = json_object_get(surface->base_texture.json, "index");
+    const json_t *emissive = gltf_member(&surface->emissive_texture, "index").json,
+                 *base_color = gltf_member(&surface->base_texture, "index").json;
     if (!emissive) {
         look->emission = emission;
         return;
@@ -262,7 +265,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
     const double transmission = clamped(surface->transmission) * (1 - clamped(surface->metal)),
                  alpha = clamped(surface->base[3]);
     if (name && !is_mask && !is_blend && strcmp(name, "OPAQUE") != 0)
-        gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND; OPAQUE is used");
+        gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND, not '%.20s'; OPAQUE is used", name);
     const double opacity = is_mask ? alpha >= surface->cutoff : is_blend ? alpha : 1;
     if (surface->base_texture.json && opacity > 0) {
         if (is_mask && surface->cutoff > 0) look->cutout.threshold = surface->cutoff / alpha;

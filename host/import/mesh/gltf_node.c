@@ -267,15 +267,15 @@ static void gltf_view_add(Gltf *gltf, const GltfItem *node, const Affine *affine
     const size_t light_count = json_array_size(lights.json);
     if (extension.json && light_count > 0)
         gltf_integer(gltf, &extension, "light", 0, light_count - 1, &light);
-    else if (extension.json)
+    else if (extension.json && !lights.is_wrong)
         gltf_fails(gltf, &extension, "refers to lights, which the file lacks");
     if ((camera != SIZE_MAX || light != SIZE_MAX) && !gltf->draft->import->view) {
         gltf_warn_once(gltf, node, draft_view);
     } else {
         const GltfItem camera_item = gltf_entry(gltf, "cameras", camera),
                        light_item = gltf_element(gltf, &lights, light);
-        if (camera_item.json) camera_add(gltf, &camera_item, affine);
-        if (light_item.json) light_add(gltf, &light_item, affine);
+        if (camera != SIZE_MAX) camera_add(gltf, &camera_item, affine);
+        if (light != SIZE_MAX) light_add(gltf, &light_item, affine);
     }
     gltf->is_optional = false;
 }
@@ -284,7 +284,9 @@ static bool gltf_node_add(Gltf *gltf, size_t index, const Affine *parent, unsign
 {
     const GltfItem node = gltf_entry(gltf, "nodes", index), children = gltf_array(gltf, &node, "children"),
                    skin = gltf_member(&node, "skin");
-    if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "has two parents in the scene");
+    if (gltf->is_visited[index])
+        return gltf_fails(gltf, &node,
+                          "is reached twice; a node may have one parent and must not contain itself");
     if (depth > DEPTH_MAX) return gltf_fails(gltf, &node, "lies more than %d nodes deep", DEPTH_MAX);
     gltf->is_visited[index] = true;
     Affine local, affine;
