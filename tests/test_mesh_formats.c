@@ -138,7 +138,7 @@ TEST(faults_name_file_and_vertex)
          "14:1: error: the file ends before vertex 4 (counted from 0) of 99999999"},
         {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
          "9:9: error: the header declares 'face' twice"},
-        {"a.gltf", "{", "1:1: error: string or '}' expected near end of file"},
+        {"a.gltf", "{", "1:1: error: the JSON is malformed: string or '}' expected near end of file"},
         {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n",
          "4:18: error: a.off: vertex 2 (counted from 0) has a coordinate that is not a number of at most "
          "1e+30 in magnitude"},

@@ -51,8 +51,8 @@ class Broken(TestCase):
 
     def test_names(self):
         write("scene.txt", "")
-        self.refuses("check scene.txt", "scene.txt: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff or .dat, or in a mesh's, "
-                     "such as .obj, .ply, .stl, .gltf, .glb, .fbx, .dae$")
+        self.refuses("check scene.txt", "scene.txt: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff, .dat or the ending of a mesh, "
+                     "such as .obj, .ply, .stl, .gltf, .glb, .fbx or .dae$")
         self.refuses("check .rt", "^")
         self.refuses("check absent.yml", "absent.yml")
 

@@ -129,7 +129,7 @@ TEST(lenient_keeps_other_errors)
                                         true);
     assert_string_equal(text_c(&messages),
                         "3:10: error: 'diameter' must be greater than 0, not '-2'\n"
-                        "4:7: error: 'center' must be a number, not nothing\n"
+                        "4:7: error: 'center' must be a number, but it is empty\n"
                         "5:4: error: 'center' must be three numbers separated by commas, not '0, 0'\n"
                         "6:9: error: 'ratio' must be 0 or more, not '-1'\n");
 }

@@ -111,9 +111,9 @@ TEST(faults_have_their_place)
                     "4:18: error: a.stl: byte 80: 2 facets are declared, but the file has only 1\n");
     memset(bytes + 80, 0xff, 4);
     file_write_bytes("a.stl", bytes, WHOLE);
-    assert_messages(
-        "scene.yaml", SCENE,
-        "4:18: error: a.stl: byte 80: 4294967295 facets are declared; at most 1431655764 are supported\n");
+    assert_messages("scene.yaml", SCENE,
+                    "4:18: error: a.stl: byte 80: 4294967295 facets are declared; at most 1431655764 are "
+                    "supported (a text file must start with 'solid')\n");
     binary_fill(bytes, "");
     memset(bytes + HEADER + 12, 0xff, 4);
     file_write_bytes("a.stl", bytes, WHOLE);

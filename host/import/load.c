@@ -93,9 +93,9 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known && !begins_dat(path))
         return message_error(messages,
-                             "%s: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff or "
-                             ".dat, or in a mesh's, such as "
-                             ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
+                             "%s: the name of a scene must end in .yaml, .yml, .json, .rt, .cfg, .nff, "
+                             ".dat or the ending of a mesh, such as .obj, .ply, .stl, .gltf, .glb, .fbx or "
+                             ".dae",
                              path);
     OwnedText text = {0};
     stage_begin(options->stage, "reading", path, 0);

@@ -131,7 +131,7 @@ bool number_read_field(Report *report, Word word, const char *name, const Range 
     switch (number_read(word.text, word.length, value)) {
     case NUMBER_MALFORMED:
         if (!word.length)
-            return report_error(report, word.offset, "'%s' must be a number, not nothing", name);
+            return report_error(report, word.offset, "'%s' must be a number, but it is empty", name);
         return report_error(report, word.offset, "'%s' must be a number, not '%.*s'", name, WORD_TEXT(word));
     case NUMBER_TOO_LARGE:
         return report_error(report, word.offset, "'%s' must be at most %g in magnitude, not '%.*s'", name,

@@ -135,7 +135,7 @@ static bool shape_fits(Object *object)
 
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
 {
-    static const char *const out_of_range = "would have a size of 0 or a number above 1e30 in magnitude";
+    static const char *const out_of_range = "would have a size of 0 or numbers above 1e30";
     if (object->type == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
     if (object->type == SHAPE_MESH) {
         Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
@@ -145,7 +145,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
     }
     if (!shape_transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
-            return "would no longer be one, so it cannot have an image";
+            return "would become an oval, which cannot have an image";
         oval_make(object);
         oval_transform(object, affine);
     }

@@ -87,8 +87,10 @@ static bool binary_read(MeshDraft *draft)
     const size_t count = facet_count(source);
     const size_t held = (source->length - HEADER_SIZE) / FACET_SIZE;
     if (count > DRAFT_VERTICES_MAX / 3)
-        return draft_fails(draft, HEADER_SIZE - 4, "%zu facets are declared; at most %u are supported", count,
-                           DRAFT_VERTICES_MAX / 3);
+        return draft_fails(draft, HEADER_SIZE - 4,
+                           "%zu facets are declared; at most %u are supported (a text file must start with "
+                           "'solid')",
+                           count, DRAFT_VERTICES_MAX / 3);
     if (count > held)
         return draft_fails(draft, HEADER_SIZE - 4, "%zu facet%s %s declared, but the file has only %zu",
                            count, text_plural(count), text_is_are(count), held);

@@ -70,9 +70,8 @@ static bool keys_read(YamlReader *reader, const YamlNode *frames, Keys *keys)
         Key key = {.node = (uint32_t)(value - tree->nodes.items)};
         if (!node_number(reader, name, &key.frame)) return expected_report(reader, "frame", "a number", name);
         if (keys->count > 0 && key.frame <= keys->items[keys->count - 1].frame)
-            return report_error(&reader->report, name->offset,
-                                "frame %g must be greater than frame %g before it", key.frame,
-                                keys->items[keys->count - 1].frame);
+            return report_error(&reader->report, name->offset, "frames must ascend, but %g follows %g",
+                                key.frame, keys->items[keys->count - 1].frame);
         if (++reader->key_count > KEYS_MAX)
             return report_error(&reader->report, name->offset, "a scene may have at most %d keys", KEYS_MAX);
         if (!values_match(reader, before ? before : value, value)) return false;

@@ -19,7 +19,8 @@ bool expected_report(YamlReader *reader, const char *name, const char *expected,
     else if (node->type == YAML_SEQUENCE)
         snprintf(found, sizeof found, "a list of %u", node->child_count);
     else if (yaml_text(&reader->tree, node)[0] == '\0')
-        snprintf(found, sizeof found, "nothing");
+        return report_error(&reader->report, node->offset, "'%s' must be %s, but it is empty", name,
+                            expected);
     else
         snprintf(found, sizeof found, "'%.*s'", WORD_SHOWN, yaml_text(&reader->tree, node));
     return report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
@@ -107,7 +108,8 @@ static bool unknown_field_report(YamlReader *reader, const YamlNode *key, const 
 
 bool key_is_word(YamlReader *reader, const YamlNode *key)
 {
-    return key->type == YAML_SCALAR || report_error(&reader->report, key->offset, "a key must be a word");
+    return key->type == YAML_SCALAR ||
+           report_error(&reader->report, key->offset, "a key must be a plain word or a string in quotes");
 }
 
 static Form field_forms(const Field *field)
@@ -137,7 +139,7 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
 {
     const Names names = {fields, field_count, sizeof *fields};
     if (!node_has_type(reader, mapping, YAML_MAPPING, what)) return false;
-    bool seen[FIELDS_MAX] = {false}, all_read = true, is_mixed = false;
+    bool seen[FIELDS_MAX] = {false}, meant[FIELDS_MAX + 1] = {false}, all_read = true, is_mixed = false;
     Form forms = FORM_ANY;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key && !report_is_full(&reader->report);
@@ -145,9 +147,11 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
         value = yaml_next(&reader->tree, key);
         size_t index = name_find(names, yaml_text(&reader->tree, key));
         const Field *field = &fields[index];
-        if (index == field_count)
+        if (index == field_count) {
             all_read = key_is_word(reader, key) && unknown_field_report(reader, key, what, names);
-        else if (seen[index])
+            const char *name = name_meant(yaml_text(&reader->tree, key), names);
+            meant[name ? name_find(names, name) : field_count] = true;
+        } else if (seen[index])
             all_read = report_error(&reader->report, key->offset, "'%s' is given twice", field->name);
         else if (form_narrow(reader, key, field, fields, seen, &forms))
             all_read &= field->read(reader, field, value, (char *)target + field->offset);
@@ -157,7 +161,8 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
     }
     const Form chosen = forms & -forms; // the first
     for (size_t i = 0; i < field_count && !is_mixed; i++)
-        if ((fields[i].forms & REQUIRED) && (field_forms(&fields[i]) & chosen) && !seen[i])
+        if ((fields[i].forms & REQUIRED) && (field_forms(&fields[i]) & chosen) && !seen[i] &&
+            !meant[i]) // whose wrong spelling was reported
             all_read =
                 report_error(&reader->report, mapping->offset, "the %s lacks '%s'", what, fields[i].name);
     return all_read && !is_mixed ? chosen : 0;

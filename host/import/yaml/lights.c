@@ -30,7 +30,7 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
         return expected_report(reader, field->name, "inverse_square or a mapping", node);
     if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), fading)) return false;
     return fading[0] + fading[1] + fading[2] > 0 ||
-           report_error(&reader->report, node->offset, "'%s' must have a number above 0", field->name);
+           report_error(&reader->report, node->offset, "'%s' needs at least one number above 0", field->name);
 }
 
 // The last rows of the tables of all lights, of those that may fade, and of those with an area.

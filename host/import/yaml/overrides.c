@@ -18,10 +18,11 @@ typedef struct {
     uint32_t previous; // the parent's child before the node and its key; 0: none
 } Path;
 
-// The parts before the last one, for printf's %.*s.
+// The parts before the last one, in quotes, for printf's %s%.*s%s.
 #define PARENT(path)                                                                                         \
-    (path)->parent_end > 0 ? (int)(path)->parent_end : (int)strlen("scene"),                                 \
-        (path)->parent_end > 0 ? (path)->text : "scene"
+    (path)->parent_end > 0 ? "'" : "the ",                                                                   \
+        (path)->parent_end > 0 ? (int)(path)->parent_end : (int)strlen("scene"),                             \
+        (path)->parent_end > 0 ? (path)->text : "scene", (path)->parent_end > 0 ? "'" : ""
 
 // Adds a scalar without a parent, at an offset of the override's text.
 static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
@@ -50,14 +51,14 @@ static bool node_is(const Path *path, YamlType type)
     static const char *const names[] = {
         [YAML_SCALAR] = "a value", [YAML_SEQUENCE] = "a list", [YAML_MAPPING] = "a mapping"};
     const YamlType found = yaml_node(path->tree, path->node)->type;
-    return found == type || report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path),
-                                         names[found], names[type]);
+    return found == type || report_error(path->report, path->parent_end, "%s%.*s%s is %s, not %s",
+                                         PARENT(path), names[found], names[type]);
 }
 
 static bool path_report(const Path *path)
 {
     return report_error(path->report, path->at,
-                        "a value is set by PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
+                        "expected PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
 }
 
 static bool part_is_last(const Path *path)
@@ -86,7 +87,8 @@ static bool missing_report(const Path *path, const char *name, size_t start)
         if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
     OwnedText choices = {0};
     choices_describe(&choices, name, (Names){known, known_count, sizeof *known});
-    return report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
+    return report_error(path->report, start, "%s%.*s%s has no '%.*s'%s%s", PARENT(path), WORD_SHOWN, name,
+                        part_is_last(path) ? "" : "; only the last part of a path may be new",
                         text_c(&choices));
 }
 
@@ -125,8 +127,9 @@ static bool index_follow(Path *path, uint32_t index, size_t start)
     if (!node_is(path, YAML_SEQUENCE)) return false;
     const uint32_t count = yaml_node(path->tree, path->node)->child_count;
     if (index > count || (index == count && !can_add(path)))
-        return report_error(path->report, start, "'%.*s' has %u element%s, counted from [0]", PARENT(path),
-                            count, text_plural(count));
+        return report_error(path->report, start,
+                            "%s%.*s%s has no [%u]; it has %u element%s, counted from [0]", PARENT(path),
+                            index, count, text_plural(count));
     yaml_children_unshare(path->tree, path->node);
     uint32_t last = 0, child = yaml_node(path->tree, path->node)->first;
     for (uint32_t i = 0; i < index; i++) {
@@ -146,7 +149,8 @@ static bool path_index_read(Path *path)
     const size_t start = path->at, digits = strspn(path->text + start + 1, "0123456789");
     path->at += 1 + digits;
     if (digits == 0 || digits > 9 || path->text[path->at] != ']')
-        return report_error(path->report, start, "an index must be a number in brackets, such as [0]");
+        return report_error(path->report, start,
+                            "an index must be a whole number from 0 in brackets, such as [0]");
     path->at++;
     return index_follow(path, (uint32_t)strtoul(path->text + start + 1, NULL, 10), start);
 }

@@ -82,7 +82,7 @@ static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode
         return report_error(builder->report, node.offset, not_well_formed);
     text_append(texts, "", 1);
     if (memchr(texts->items + node.text, '\0', texts->count - node.text - 1))
-        return report_error(builder->report, node.offset, "texts must not contain NUL characters");
+        return report_error(builder->report, node.offset, "strings must not contain NUL characters");
     node_append(builder, node);
     return true;
 }

@@ -62,7 +62,7 @@ static bool source_is_safe(const Source *source, Report *report)
                               (at + 1 == end || character_is_space(at[1]));
         if (is_apart && may_begin_key(start, at))
             return report_error(report, (size_t)(at - start),
-                                "a '?' begins a key in a text with tabs; replace the tabs by spaces");
+                                "a '?' begins a key in a text with tabs; replace the tabs with spaces");
     }
     return true;
 }

@@ -127,7 +127,7 @@ typedef struct {
 static void document_read(YamlReader *reader)
 {
     static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
-    static const Range range_frame_rate = {NUMBER_MIN, 1000, false, "above 0 and at most 1000"};
+    static const Range range_frame_rate = {NUMBER_MIN, 1000, false, "greater than 0 and at most 1000"};
     static const Field fields[] = {
         {"include", read_include, 0},
         {"camera", read_node, offsetof(Document, camera)},
