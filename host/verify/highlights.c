@@ -45,7 +45,7 @@ void verify_highlights(VerifyRun *run)
         double brightest = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             double value = image.color[3 * i];
-            run->result->wrong += value < 0 || value > 1 + 0x1p-20;
+            run->result->wrong += !(value >= 0 && value <= 1 + 0x1p-20); // a NaN is wrong
             seen += image.object[i] == 0;
             brightest = fmax(brightest, value);
             if (run->tier == TIER_A || image.object[i] != 0 || power > power_max) continue;
