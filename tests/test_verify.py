@@ -83,7 +83,7 @@ class Verify(VerifyTestCase):
         report = self.json("verify S1 --precision single --perturb 1:1000 --json", 3)
         self.assertEqual(report["perturb"], {"seed": 1, "scale": 1000})
         text = self.glint("verify P4 --precision single").stdout
-        self.assertIn("tier B: 1 of 1 case passed", text)
+        self.assertRegex(text, r"tier B: 1 of 1 case passed, in [0-9.]+ s; trace kernel [0-9a-f]{16}\n")
         self.assertIn(f"; reference of {report['reference_bits']} bits\n", text)
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes themselves")
@@ -105,7 +105,7 @@ class Verify(VerifyTestCase):
                 self.assertEqual((report["passed"], report["failed"]), (2, 1))
         process = run(f"verify {' '.join(cases)} --precision single --quick", env=env)
         self.assertEqual(process.returncode, 3)
-        self.assertRegex(process.stdout, r"\A.*; reference of .*\nsingle\n  S2 .* FAIL  clEnqueue.* at the kernel path\n"
+        self.assertRegex(process.stdout, r"\A.*; reference of .* bits; --quick\n  case   test +largest error of its bound\nsingle\n  S2 .* FAIL  clEnqueue.* at the kernel path\n"
                                          r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
 
     @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")

@@ -231,6 +231,12 @@ static RenderSettings precision_settings(const VerifyOptions *options, Precision
     return settings;
 }
 
+// Prints the hash of a kernel unless no case needed it.
+static void hash_print(Verification *verification, const char *kernel, uint64_t hash)
+{
+    if (hash != 0) text_print(verification, "; %s kernel %016" PRIx64, kernel, hash);
+}
+
 // Runs the cases at the current precision that have not ended.
 static void precision_verify(Verification *verification, Compute *compute)
 {
@@ -256,11 +262,11 @@ static void precision_verify(Verification *verification, Compute *compute)
     if (!compute_ok(compute)) return;
     record->is_ended = true;
     const size_t count = records_count(record, has_ended);
-    text_print(verification,
-               "  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64
-               ", render %016" PRIx64 "\n",
-               verification->tier, count - records_count(record, has_failed), count, text_plural(count),
-               record->seconds, record->kernels.trace_hash, record->kernels.render_hash);
+    text_print(verification, "  tier %c: %zu of %zu case%s passed, in %.1f s", verification->tier,
+               count - records_count(record, has_failed), count, text_plural(count), record->seconds);
+    hash_print(verification, "trace", record->kernels.trace_hash);
+    hash_print(verification, "render", record->kernels.render_hash);
+    text_print(verification, "\n");
 }
 
 static void precision_json(Json *json, const PrecisionRecord *record, Precision precision,
@@ -317,8 +323,8 @@ static int device_verify(Verification *verification, Compute *compute)
         !precision_is_suitable(compute, options, first))
         return EXIT_USER;
     if (!journal->is_headed)
-        text_print(verification, "%s; reference of %d bits%s\n", compute->device->name, QUAD_BITS,
-                   options->quick ? "; quick" : "");
+        text_print(verification, "%s; reference of %d bits%s\n  case   %-60s %s\n", compute->device->name,
+                   QUAD_BITS, options->quick ? "; --quick" : "", "test", "largest error of its bound");
     journal->is_headed = true;
     verification->row_count = verification->case_count * (size_t)(last - first + 1);
     size_t failed = 0;
