@@ -98,6 +98,9 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
                          count);
         else if (count > 0 && fault)
             report_error(&report, start, "%s", fault);
+        else if (count > 0 && ray.tmax <= ray.tmin)
+            report_error(&report, start, "tmax must be above tmin, but %g is not above %g", ray.tmax,
+                         ray.tmin);
         else if (count > 0)
             array_push(*rays, ray);
         start = end + 1;
@@ -119,8 +122,7 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     if (is_npy(&text))
         return message_error(
             &messages,
-            "%s: a NumPy array; rays are text, six or eight numbers a line: origin, direction and, if "
-            "given, tmin and tmax",
+            "'%s' is a NumPy array, but rays must be text with ox oy oz dx dy dz [tmin tmax] on each line",
             options->rays);
     const Source source = {options->rays, text_c(&text), text.count};
     return rays_read(rays, &source, &options->common, &messages);
