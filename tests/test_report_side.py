@@ -74,9 +74,9 @@ class SideBySide(TestCase):
             self.assertTrue(cell["comparison"]["low"] < ratio < cell["comparison"]["high"] < 1.1 * ratio, cell)
         self.assertEqual([(letter, float(frame)) for letter, frame in figures(out)],
                          [("A", 10), ("B", 5), ("A", 20), ("B", 20.2), ("A", 5), ("B", 5.5)])  # fmt: skip
-        self.assertRegex(out, r"(?m)^scene +precision +report +frame ms +quartile +quartile +kernel ms +time +verdict$")
+        self.assertRegex(out, r"(?m)^scene +precision +report +frame ms +quartile +quartile +kernel ms +A +verdict$")
         self.assertRegex(out, r"(?m)^ +B +5  +4\.990  +5\.010  +2\.500  0\.5000 \(0\.4\d\d to 0\.5\d\d\)  faster$")
-        self.assertIn("3 rows, 3 with times in A and here: 0.822 times A's frame time (geometric mean), 1 faster, 1 slower, 1 same", out)
+        self.assertIn("3 rows, 3 of them with times in A: 0.822 of A's frame time (geometric mean), 1 faster, 1 slower, 1 same", out)
         self.assertAlmostEqual(data["reports"][1]["mean_ratio"], (0.5 * 1.01 * 1.1) ** (1 / 3), places=9)
         self.assertIn("\n\n64x48, lanes 16, BVH auto, samples 1, bounces 5\n", out)
 
@@ -137,7 +137,7 @@ class SideBySide(TestCase):
         self.assertEqual([entry["common"] for entry in data["reports"]], [0, 1, 1])
         out, data = self.compared(report(run(10)), report(run(10, bounces=6)))
         self.assertEqual(len(data["rows"]), 2)
-        self.assertIn("1 row, 0 with times in A and here\n", out)
+        self.assertIn("1 row, 0 of them with times in A\n", out)
 
     def test_lanes(self):
         """A device's number of lanes does not make another row, but several numbers do. If they differ, no verdict is printed."""
@@ -160,11 +160,11 @@ class SideBySide(TestCase):
         save("empty.json", report())
         save("hashless.json", report(run(10), run(10, scene_hash="a1")))
         write("cut.json", Path(good).read_text(encoding="utf-8")[:-9])
-        for path, reason in [("old.json", "'.* is a report with schema 5; expected 6 to 7"), ("new.json", "'.* with schema 8; expected 6 to 7"), ("empty.json", "'.*has no rows"),
+        for path, reason in [("old.json", "'.* has schema 5, but glint reads 6 to 7; re-measure it"), ("new.json", "'.* has schema 8, but glint reads 6 to 7; re-measure it"), ("empty.json", "'.*has no rows"),
                              ("cut.json", r":\d+:\d+: error: not a report of glint bench --json: "),
                              ("hashless.json", "'.*row 2 has no valid scene_hash"), ("none.json", "'.*No such file")]:  # fmt: skip
             self.refuses(f"report {good} {path} --html page.html", f"{path}{reason}")
-        self.refuses(f"report {good} S1", "reports .* and cases cannot be combined")
+        self.refuses(f"report {good} S1", "^glint: 'S1' is not a report of glint bench, whose name ends in .json$")
         for option in "-o r.tar.gz", "--device 0", "--seconds 5":
             self.refuses(f"report {good} {option}", "--html is the only option for reports")
         self.refuses("report S1 --html page.html", "--html needs reports")

@@ -78,24 +78,28 @@ static bool is_bench_report(const char *operand)
     return ending && strcmp(ending, ".json") == 0;
 }
 
-static bool operand_check(const char *operand)
+// Checks that the operands are cases, or all are reports of glint bench to compare.
+static bool operands_check(const ReportChoice *choice)
 {
-    return is_bench_report(operand) || verify_case_check(operand);
+    for (size_t i = 0; i < choice->operands.count; i++) {
+        const char *operand = choice->operands.items[i];
+        if (!choice->compares && !verify_case_check(operand)) return false;
+        if (choice->compares && !is_bench_report(operand))
+            return stderr_print("'%s' is not a report of glint bench, whose name ends in .json", operand);
+    }
+    return true;
 }
 
-// Checks the operands, which are cases, or reports of glint bench to compare.
 static const char *options_check(void *report_choice)
 {
     ReportChoice *choice = report_choice;
-    const size_t operand_count = choice->operands.count;
     passed_list(choice);
     size_t count = 0;
-    for (size_t i = 0; i < operand_count; i++)
+    for (size_t i = 0; i < choice->operands.count; i++)
         count += is_bench_report(choice->operands.items[i]);
     choice->compares = count > 0 || choice->page;
     if (!choice->compares) return NULL;
     if (count == 0) return "--html needs reports of glint bench, whose names end in .json";
-    if (count < operand_count) return "reports (.json) and cases cannot be combined";
     if (choice->output || choice->seconds > 0 || choice->passed_count > 0)
         return "--html is the only option for reports (.json)";
     if (count > SIDE_REPORTS_MAX) return "at most 26 reports can be compared";
@@ -107,10 +111,10 @@ static const CommandLine command_line = {
     .usage = "usage: glint report [CASE...] [OPTIONS]\n"
              "       glint report REPORT.json... [--html FILE]\n\n"
              "Writes an archive for a bug report: the output of glint devices, its passports, glint verify "
-             "--quick "
-             "and a small\nglint bench, the text and build log of every kernel, and versions. All kernels "
-             "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
-             "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
+             "--quick and a\nsmall glint bench, the text and build log of every kernel, and versions. All "
+             "kernels are built, which takes\nminutes. A step that fails or crashes is named in index.txt. "
+             "Names of the user, the host and folders are left\nout. With CASE, glint verify runs only these "
+             "cases.\n",
     .groups = {OPTIONS(archive_options),
                OPTIONS(command_precision),
                OPTIONS(device_option),
@@ -121,7 +125,6 @@ static const CommandLine command_line = {
                 "devices, versions or days. A\nrow is faster or slower than in the first report only where "
                 "both are of the same device and host.\n"}},
     OPERANDS(ANY, ReportChoice, operands),
-    .operand_check = operand_check,
     .check = options_check};
 
 // A command that the report runs in its folder. It prints to the file `name`.`prints`.
@@ -361,8 +364,10 @@ int command_report(int argument_count, char **arguments)
     ReportChoice choice = {0};
     int status = command_line_read(&command_line, &choice, argument_count, arguments);
     if (status == OPTIONS_READ)
-        status = choice.compares ? side_by_side_run(choice.operands.items, choice.operands.count, choice.page)
-                                 : archive_make(&choice);
+        status = !operands_check(&choice) ? EXIT_USER
+                 : choice.compares
+                     ? side_by_side_run(choice.operands.items, choice.operands.count, choice.page)
+                     : archive_make(&choice);
     for (size_t i = 0; i < choice.passed_count; i++)
         free(choice.passed[i]);
     return status;

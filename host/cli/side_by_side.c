@@ -110,7 +110,7 @@ static void cell_compare(const SideBySide *side, SideCell *cell, const SideRepor
         comparison = row_compare(&newer_times, &older_times, is_cpu,
                                  side->row_count * (side->report_count - 1), baseline_tolerance);
     if (!comparison.why_not && !isfinite(comparison.frame.high))
-        comparison.why_not = "there are too few runs";
+        comparison.why_not = "there are too few runs; measure longer (glint bench --seconds)";
     if (!comparison.why_not) cell->ratio = comparison.frame.ratio;
     cell->comparison = comparison;
 }
@@ -180,7 +180,7 @@ static const ResultTable side_table = {
     .names = {"scene", "size", "precision", "lanes", "BVH=bvh", "samples", "bounces", "variant", "report"},
     .values = {"frame ms=frame_ms.median", "lower quartile=frame_ms.lower_quartile",
                "upper quartile=frame_ms.upper_quartile", "kernel ms=kernel_ms.median",
-               "times A's frame time=comparison", "verdict=comparison.verdict"},
+               "ratio to A=comparison", "verdict=comparison.verdict"},
     .is_one_table = true,
 };
 
@@ -278,8 +278,8 @@ static void report_print(const SideBySide *side, size_t index)
            baseline->board[0] != '\0' ? ")" : "", baseline->platform, baseline->driver);
     if (baseline->host[0] != '\0') printf(", host %s", baseline->host);
     printf("\n   %zu row%s", baseline->count, text_plural(baseline->count));
-    if (index > 0) printf(", %zu with times in A and here", report->ratio_count);
-    if (report->ratio_count > 0) printf(": %.3g times A's frame time (geometric mean)", report->mean_ratio);
+    if (index > 0) printf(", %zu of them with times in A", report->ratio_count);
+    if (report->ratio_count > 0) printf(": %.3g of A's frame time (geometric mean)", report->mean_ratio);
     for (size_t verdict = VERDICT_FASTER + 1; verdict-- > 0;)
         if (report->verdicts[verdict] > 0)
             printf(", %zu %s", report->verdicts[verdict], verdict_names[verdict]);

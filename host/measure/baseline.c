@@ -167,7 +167,7 @@ static bool schema_check(const char *path, const json_t *report, MessageList *me
         return message_error(messages, "'%s' is not a report of glint bench --json", path);
     const double version = json_number_value(schema);
     return (version >= BENCH_SCHEMA_OLDEST && version <= BENCH_SCHEMA) ||
-           message_error(messages, "'%s' is a report with schema %g; expected %d to %d: re-measure it", path,
+           message_error(messages, "'%s' has schema %g, but glint reads %d to %d; re-measure it", path,
                          version, BENCH_SCHEMA_OLDEST, BENCH_SCHEMA);
 }
 
