@@ -62,26 +62,26 @@ class Golden(TestCase):
         self.written()
         for change, layer, part in (
                 (("radius: 1", "radius: 1.0000001"), "object|t", None), (("fov: 60", "fov: 61"), "object|t", None),
-                (("[3, 4, -5]", "[-3, 4, -5]"), "color|shadow", None), (("[0.1, 0.2, 0.4]", "[0.1, 0.2, 0.5]"), "color", "0 to 23, 0 to 17")):
+                (("[3, 4, -5]", "[-3, 4, -5]"), "color|shadow", None), (("[0.1, 0.2, 0.4]", "[0.1, 0.2, 0.5]"), "color", "x 0 to 23 and y 0 to 17")):
             with self.subTest(change):
                 self.assertIn(change[0], SPHERE)
                 write("s.yaml", SPHERE.replace(*change))
                 out = self.glint("golden check", status=3).stdout
-                found = re.fullmatch(r"s\.yaml: different, first in (\w+); the scene has changed; (\d+) of 96 tiles, within pixels "
-                                     r"(\d+) to (\d+), (\d+) to (\d+): s\.yaml-golden\.png\n", out)
+                found = re.fullmatch(r"s\.yaml: the scene has changed, and the image differs, first in (\w+); its color in (\d+) of 96 tiles, "
+                                     r"at x (\d+) to (\d+) and y (\d+) to (\d+), written to s\.yaml-golden\.png\n", out)
                 self.assertIsNotNone(found, out)
                 self.assertRegex(found[1], f"^({layer})$")
                 left, right, top, bottom = map(int, found.groups()[2:])
                 self.assertEqual(png_read("s.yaml-golden.png")[0][:2], (right - left + 1, bottom - top + 1))
                 if part:
-                    self.assertIn(f"within pixels {part}", out)
+                    self.assertIn(f"at {part}", out)
 
     def test_every_part_of_a_line_counts(self):
         """A changed digit of any layer's hash is reported as a difference of that layer, although the scene is the same."""
         line = self.written()
         for layer in "object", "t", "normal", "shadow", "path", "color":
             write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
-            self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
+            self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: the image differs, first in {layer}\n")
 
     def test_one_changed_bit_is_found(self):
         """The lowest bit of one number is changed, at a random place of each layer."""
@@ -92,7 +92,7 @@ class Golden(TestCase):
         for i in range(1000 if IS_LONG else 12):
             env = {"LD_PRELOAD": shim, "MAP": str(i % 6), "WORD": str(chosen.randrange(1 << 30))}
             out = self.glint("golden check", status=3, env=env).stdout
-            layers.setdefault(i % 6, set()).add(re.match(r"s\.yaml: different, first in (\w+)", out)[1])
+            layers.setdefault(i % 6, set()).add(re.match(r"s\.yaml: the image differs, first in (\w+)", out)[1])
         self.assertEqual(sorted(map(list, layers.values())), [["color"], ["normal"], ["object"], ["path"], ["shadow"], ["t"]])
 
     def test_interrupt(self):
@@ -116,14 +116,14 @@ class Golden(TestCase):
         for folder in "a", "b":
             write(f"{folder}/s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
         out = self.glint("golden check", status=3).stdout
-        self.assertRegex(out, r"(?s)a/s\.yaml.*: a-s\.yaml-golden\.png\nb/s\.yaml.*: b-s\.yaml-golden\.png\n")
+        self.assertRegex(out, r"(?s)a/s\.yaml.* to a-s\.yaml-golden\.png\nb/s\.yaml.* to b-s\.yaml-golden\.png\n")
 
     def test_reports(self):
         self.written()
         (scene,) = self.json("golden check --json")["scenes"]
         self.assertEqual((scene["scene"], scene["same"], scene["verdict"], scene["tiles"]), ("s.yaml", True, "same", 0))
         write("new.yaml", SPHERE)
-        self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: no line; glint golden write adds it\n")
+        self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: golden.txt has no line for this scene; glint golden write adds it\n")
         (scene,) = self.json("golden check new.yaml --json", status=3)["scenes"]
         self.assertEqual((scene["same"], scene["verdict"], scene["first"]), (False, "no line", None))
         write("s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
@@ -154,6 +154,7 @@ class Golden(TestCase):
         write("golden.txt", "# nothing\n")
         self.refuses("golden check", "'golden.txt' has no lines")
         self.refuses("golden check --size 8x6", "apply to write")
+        self.refuses("golden check missing.yaml", "cannot read 'missing.yaml': No such file or directory")
         self.refuses("golden check --file missing.txt", "missing.txt")
         self.refuses("golden", "expected write or check")
         self.refuses("golden write", "no scene given")

@@ -12,6 +12,7 @@
 #include "host/cli/open_device.h"
 #include "host/cli/report_json.h"
 #include "host/image/image.h"
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -82,15 +83,15 @@ static const char *options_check(void *golden_options)
 
 static const CommandLine command_line = {
     .command = "golden",
-    .usage =
-        "usage: glint golden write SCENE... [OPTIONS]\n"
-        "       glint golden check [SCENE...] [OPTIONS]\n\n"
-        "Renders scenes at strict, whose bits are the same on every device. Writes a line of hashes per "
-        "scene, or compares the\n"
-        "scenes with their lines, by default all scenes of the file. If an image differs, prints the "
-        "first layer that\n"
-        "differs and the pixels, and writes these pixels to SCENE-golden.png in the current folder. Exit "
-        "status: 0 same, 3 different.\n",
+    .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
+             "       glint golden check [SCENE...] [OPTIONS]\n\n"
+             "Renders scenes at strict, whose bits are the same on every device. Writes a line of hashes per "
+             "scene, or\n"
+             "compares the scenes with their lines, by default all scenes of the file. If an image differs, "
+             "prints the first\n"
+             "layer that differs and the pixels, and writes these pixels to SCENE-golden.png in the current "
+             "folder. Exit\n"
+             "status: 0 same, 3 different.\n",
     .groups = {OPTIONS(command_options), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(device_option),
                OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options), REPORT_OPTIONS},
     OPERANDS(ANY, GoldenOptions, scenes),
@@ -234,22 +235,24 @@ static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t
     return json;
 }
 
-static void check_print(const GoldenCheck *check)
+static void check_print(const GoldenCheck *check, const char *file)
 {
     if (check->is_new) {
-        printf("%s: no line; glint golden write adds it\n", check->scene);
+        printf("%s: %s has no line for this scene; glint golden write adds it\n", check->scene, file);
         return;
     }
     if (check->first == HASHED_COUNT) {
         printf("%s: same\n", check->scene);
         return;
     }
-    printf("%s: different, first in %s", check->scene, layer_names[hashed_layers[check->first]]);
-    if (check->scene_differs) fputs("; the scene has changed", stdout);
+    printf("%s: %sthe image differs, first in %s", check->scene,
+           check->scene_differs ? "the scene has changed, and " : "",
+           layer_names[hashed_layers[check->first]]);
     if (check->tile_count > 0)
-        printf("; %zu of %d tiles, within pixels %u to %u, %u to %u", check->tile_count, TILES,
+        printf("; its color in %zu of %d tiles, at x %u to %u and y %u to %u", check->tile_count, TILES,
                check->box.left, check->box.right - 1, check->box.top, check->box.bottom - 1);
-    printf("%s%s\n", check->crop ? ": " : "", check->crop ? check->crop : "");
+    if (check->crop) printf(", written to %s", check->crop);
+    printf("\n");
 }
 
 // Adds the scenes to the lines, or replaces the lines that exist. Returns the exit status.
@@ -278,6 +281,11 @@ static int scene_check(GoldenCheck *check, const GoldenFile *file, const GoldenO
                        Compute *compute)
 {
     const GoldenLine *golden = golden_file_find(file, check->scene);
+    check->has_failed = !golden && access(check->scene, F_OK) != 0;
+    if (check->has_failed) {
+        stderr_print("cannot read '%s': %s", check->scene, strerror(errno));
+        return EXIT_USER;
+    }
     check->is_new = !golden;
     if (!golden) return EXIT_CHECK;
     GoldenLine now = *golden;
@@ -306,7 +314,7 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         const int result = scene_check(check, file, options, compute);
         continues = result != EXIT_MACHINE && result != EXIT_INTERRUPTED;
         if (check->has_failed || status == EXIT_DONE) status = result;
-        if (!check->has_failed && report_has_text(report)) check_print(check);
+        if (!check->has_failed && report_has_text(report)) check_print(check, options->file);
     }
     if (continues && report_has_document(report) &&
         !report_write(checks_json(compute->device, checks, checked), report))
