@@ -195,7 +195,7 @@ static int precision_choose(ImageRender *render, Pilot *pilot)
     if (options->quiet) return EXIT_DONE;
     OwnedText line = {0};
     pilot_describe(&line, pilot);
-    stderr_print("--max-error: %s, %.0f ms", text_c(&line), 1e3 * pilot->seconds);
+    stderr_print("--max-error chose %s; %.0f ms", text_c(&line), 1e3 * pilot->seconds);
     return EXIT_DONE;
 }
 

@@ -242,8 +242,10 @@ void pilot_describe(Text *text, const Pilot *pilot)
         for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
             is_kept = is_kept || (i != PRECISION_DOUBLE && pilot->candidates[i].verdict.keeps);
         text_appendf(text,
-                     is_kept ? "no precision that keeps %s within %g is faster"
-                             : "no faster precision is known to keep %s within %g",
+                     is_kept
+                         ? "no precision that keeps %s within %g is faster"
+                         : "no faster precision is known to keep %s within %g; a larger image or budget may "
+                           "allow one",
                      error_metric_names[budget->metric], budget->limit);
     } else if (budget->metric == ERROR_MAX) {
         text_appendf(
@@ -255,10 +257,10 @@ void pilot_describe(Text *text, const Pilot *pilot)
                                                   : "%s at most %.2g with %g%% confidence",
                      error_metric_names[budget->metric], verdict->bound, percent);
     }
-    text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
+    text_appendf(text, "; the sample has %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
     if (budget->metric != ERROR_RMSE) return;
     if (pilot->color_max <= DBL_MAX)
-        text_appendf(text, ", colors up to %.3g", pilot->color_max);
+        text_appendf(text, "; no color is above %.3g", pilot->color_max);
     else
         text_appendf(text, "; the RMSE has no bound, because a fading light has no greatest brightness");
 }
