@@ -24,6 +24,7 @@ WRONG_COMMAND_LINES = [
     ("--timing=trace takes one image", "render sphere.yaml other.yaml --timing=trace"),
     ("must be a folder", "render sphere.yaml other.yaml -o {nowhere|sphere.yaml|''}"),
     ("'--nonsense'", "{render sphere.yaml|trace sphere.yaml|check sphere.yaml|devices} --nonsense"),
+    ("^glint: see glint check --help$", "check sphere.yaml {--nonsense|-x|--set}"),
     ("rays", "trace sphere.yaml"),
     ("requires an argument", "render sphere.yaml --size"),
     ("--size: expected", "render sphere.yaml --size {0x5|5x0|5|5x|5x5x5|-5x5|1048577x4|99999999999x4|wide}"),
@@ -36,7 +37,8 @@ WRONG_COMMAND_LINES = [
     ("s.rt: only values of YAML scenes", "{render|check} s.rt --set camera.fov=60"),
     ("cannot read 'nowhere.yaml'", "{render|trace --rays rays|check|bench|accuracy|certify} sphere.yaml --camera nowhere.yaml"),
     ("--set: may be given at most 64 times", "check sphere.yaml" + 65 * " --set camera.fov=60"),
-    ('--bits: .*"12"', "render sphere.yaml --bits 12"),
+    ('--bits: expected 8 or 16, not "12"$', "render sphere.yaml --bits 12"),
+    ("--bits is for PNG and PPM", "render sphere.yaml --bits 16 -o a.{exr|npy}"),
     ('--tone: .*"flimic".*did you mean filmic', "render sphere.yaml --tone flimic"),
     ("--exposure: expected", "render sphere.yaml --exposure {bright|1x|65|-65|nan|''}"),
     ("EXR and NPY hold linear", "render sphere.yaml -o a.{exr|npy} {--tone filmic|--exposure -1|--dither}"),
@@ -73,6 +75,7 @@ WRONG_RAYS = [
     ("^rays:1:1: error: expected .*7", "0 0 -4 0 0 1 0"),
     ("^rays:1:18: error: expected .*more", "0 0 -4 0 0 1 0 1 2"),
     ("the direction is not finite", "0 0 -4 0 0 inf"),
+    ("^rays:1:1: error: tmax must be above tmin, but 1 is not above 5$", "0 0 5 0 0 -1 5 1"),
     ("direction", "0 0 -4 0 -0 0"),
 ]
 
@@ -120,7 +123,7 @@ class Commands(TestCase):
             self.assertEqual(listed, accepted, command)
 
     def test_no_device(self):
-        self.refuses("render sphere.yaml", 'device.*"toaster"', env={"GLINT_DEVICE": "toaster"})
+        self.refuses("render sphere.yaml", 'device matches GLINT_DEVICE "toaster"', env={"GLINT_DEVICE": "toaster"})
         self.refuses("render sphere.yaml", "no OpenCL device.*pocl", env={"OCL_ICD_VENDORS": os.path.abspath("none.icd")})
 
     @unittest.skipUnless(os.path.exists(POCL["OCL_ICD_VENDORS"]), "PoCL is not installed")
@@ -157,7 +160,7 @@ class WrongInput(TestCase):
     def test_array_of_rays(self):
         with open("rays.npy", "wb") as file:
             file.write(b"\x93NUMPY\x01\x00" + 200 * b"\xff\n")
-        errors = self.refuses("trace sphere.yaml --rays rays.npy", r"rays\.npy: a NumPy array; rays are text").stderr
+        errors = self.refuses("trace sphere.yaml --rays rays.npy", r"'rays\.npy' is a NumPy array, but rays must be text").stderr
         self.assertEqual(errors.count("\n"), 1)
 
     def test_at_most_20_errors(self):

@@ -221,11 +221,11 @@ class Cutouts(TestCase):
         self.refuses("render half.yaml -o a.npy --precision certified", r"certified has no error bounds for 'cutout' \(sphere on line 3\)")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.glint("certify opaque.yaml --size 4x4" + (" --precision single" if not IS_LONG else ""))
-        self.refuses("certify half.yaml", "the exact reference does not support cutouts, so this scene cannot be certified")
+        self.refuses("certify half.yaml", "the reference in quadruple precision does not support cutouts, so this scene cannot be certified")
         write("bumps.yaml", scene.replace("image: %s.png, cutout: 0.5", "normal_map: half.png"))
         self.glint("check bumps.yaml")
         self.refuses("render bumps.yaml -o a.npy --precision certified", r"certified has no error bounds for normal maps \(sphere on line 3\)")
-        self.refuses("certify bumps.yaml", "the exact reference does not support normal maps, so this scene cannot be certified")
+        self.refuses("certify bumps.yaml", "the reference in quadruple precision does not support normal maps, so this scene cannot be certified")
 
 
 def write_bytes(path, data):

@@ -34,7 +34,7 @@ if HAS_DOUBLE:
     COMMANDS["accuracy"] = (f"accuracy s.yaml {SMALL} --seconds 0.05 --precision single,double", ["scenes", "variants"], 6,
                             {"precision": ("precision",), "wrong objects away": ("errors", "object", "away"), "crossed out": ("crossed_out",)})
     COMMANDS["certify"] = (f"certify s.yaml {SMALL} --pixels 100 --precision single,certified", ["precisions"], 3,
-                           {"precision": ("precision",), "pixels": ("compared",), "claim": ("claim",)})
+                           {"precision": ("precision",), "pixels": ("compared",), "verdict": ("claim",)})
 
 
 def rows_of(document, path):

@@ -183,7 +183,7 @@ class Frames(TestCase):
             "--frames 1x": "--frames: expected all, or A or A-B",
             "--frames 0-3 -o a-%d.jpg": r"\Aglint render: .*\.png, \.ppm, \.exr or \.npy.*\n\Z",
             "--frames 0-1000000": "--frames: expected all, or A or A-B",
-            "--frames all": "--frames all: 'moving.yaml' has no 'frames'; name them, such as 0-47",
+            "--frames all": "--frames all needs 'frames' in 'moving.yaml'; or give a range, such as --frames 0-47",
             "--frames all -o a.png": "or have a place for the number",
             "--frames 0-3 still.yaml": "--frames takes one scene",
             "--frames 0-3 --checkpoint c-%d": "--checkpoint of several frames needs --skip-existing",

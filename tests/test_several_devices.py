@@ -138,7 +138,7 @@ class SeveralDevices(TestCase):
 
     def test_wrong_lists(self):
         for devices, pattern in (("0,0", "device 0 .* is listed twice"), ("portable,0", "device 0 .* is listed twice"),
-                                 ("0,2", 'no usable device matches "2"'), ("0,", 'no usable device matches ""')):
+                                 ("0,2", 'no usable device matches "2"'), ("0,", "the name of a device is empty; the devices are: 0")):
             self.refuses(f"render sphere.yaml {SIZE} --device {devices}", pattern, env=TWO)
 
     @unittest.skipIf(IS_SANITIZED, "drivers leak")

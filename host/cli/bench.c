@@ -111,7 +111,7 @@ static const Option command_options[] = {
     {"tolerance", "R",
      "ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 with --compare)",
      option_number, offsetof(BenchOptions, tolerance), NUMBERS(1, INFINITY)},
-    {"worker", NULL, "answer another glint's --against", option_flag, offsetof(BenchOptions, is_worker)},
+    {"worker", NULL, "serve another glint's --against", option_flag, offsetof(BenchOptions, is_worker)},
     {"launches", NULL, "list the kernel launches of each row's last run", option_flag,
      offsetof(BenchOptions, launches)},
     {"no-build-times", NULL, "take kernels from the cache instead of timing their builds", option_flag,

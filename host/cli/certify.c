@@ -23,8 +23,8 @@ static const ResultTable certify_table = {
     .names = {"scene", "size", "precision"},
     .values = {"pixels=compared", "wrong objects=wrong.object", "wrong shadows=wrong.shadow",
                "wrong paths=wrong.path", "wrong colors=wrong.color", "error of right colors=color.max_right",
-               "error of wrong colors=color.max_wrong", "margin of wrong=wrong.margin",
-               "wrong but certified=wrong_certified", "uncertified=uncertified.pixels", "claim"},
+               "error of wrong colors=color.max_wrong", "largest margin where wrong=wrong.margin",
+               "wrong but certified=wrong_certified", "uncertified=uncertified.pixels", "verdict=claim"},
     .extras = {"reason"},
     .verdicts = {"claim"},
     .failed = "broken",
@@ -39,16 +39,15 @@ typedef struct {
 static const Option command_options[] = {{"pixels", "N", "compare about N pixels (default: 2000)",
                                           option_count, offsetof(CertifyOptions, pixels),
                                           NUMBERS(1, PIXELS_MOST)},
-                                         PRECISIONS_OPTION("all that fit")};
+                                         PRECISIONS_OPTION("all that the scene and the device support")};
 
 static const CommandLine command_line = {
     .command = "certify",
     .usage =
         "usage: glint certify SCENE [OPTIONS]\n\n"
         "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
-        "pixels: "
-        "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
-        "list as uncertified.\n",
+        "pixels:\nobjects, shadows, paths, colors. Exit status 3: certified is wrong at a pixel that it does "
+        "not list as\nuncertified.\n",
     .groups = {OPTIONS(command_options), OPTIONS(size_option), OPTIONS(ray_options), SCENE_OPTIONS,
                OPTIONS(reference_option), OPTIONS(perturb_option), REPORT_OPTIONS},
     OPERANDS(SCENE, CertifyOptions, scene)};
@@ -215,7 +214,7 @@ static const char *unsupported_feature(const Scene *scene)
     if (scene_primitive_count(scene) > OBJECTS_MAX) return "more than 67,108,864 objects and triangles";
     if (features & FEATURE_CUTOUTS) return "cutouts";
     if (features & FEATURE_NORMAL_MAPS) return "normal maps";
-    if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
+    if (features & FEATURE_AREA_LIGHTS) return "area lights";
     if (features & FEATURE_LENS) return "a lens ('aperture')";
     return features & FEATURE_ORTHOGRAPHIC ? "parallel rays" : NULL;
 }
@@ -224,8 +223,9 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 {
     const char *unsupported = unsupported_feature(scene);
     if (unsupported) {
-        stderr_print("the exact reference does not support %s, so this scene cannot be certified",
-                     unsupported);
+        stderr_print(
+            "the reference in quadruple precision does not support %s, so this scene cannot be certified",
+            unsupported);
         return EXIT_USER;
     }
     Compute *compute = &open->compute;

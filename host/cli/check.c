@@ -45,7 +45,7 @@ static const CommandLine command_line = {
     .command = "check",
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
-             "ignored. For several scenes it prints one line each.\n",
+             "ignored. For\nseveral scenes it prints one line each.\n",
     .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(set_options),
                OPTION(common_options[COMMON_LENIENT]), OPTIONS(max_pixels_option)},
     OPERANDS(SCENES, CheckOptions, scenes),
@@ -97,10 +97,12 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("none");
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
-    if (facts->extent.unbounded_count > 0) printf(", plus %zu unbounded", facts->extent.unbounded_count);
+    if (facts->extent.unbounded_count > 0)
+        printf(", plus %zu unbounded object%s", facts->extent.unbounded_count,
+               text_plural(facts->extent.unbounded_count));
     if (scene->animation.frame_count > 0) printf("\n  frames     %" PRIu32, scene->animation.frame_count);
     if (scene->animation.frame_rate > 0) printf("\n  fps        %g", scene->animation.frame_rate);
-    printf("\n  features  ");
+    printf("\n  features  %s", facts->features ? "" : " none");
     for (unsigned i = 0; i < FEATURE_COUNT; i++) {
         if (!(facts->features >> i & 1)) continue;
         char name[64];

@@ -8,6 +8,7 @@
 #include "host/image/image.h"
 #include "host/scene/scene.h"
 #include <assert.h>
+#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
@@ -158,7 +159,8 @@ static bool names_fault(const Option *option, const char *value, const char *exp
     fprintf(stderr, "glint: --%s: expected %s", option->name, expected);
     for (size_t i = 0; i < option->name_count; i++)
         fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == option->name_count ? " or " : ", ", option->names[i]);
-    const char *near = text_nearest(value, option->names, option->name_count);
+    const char *near =
+        isdigit((unsigned char)*value) ? NULL : text_nearest(value, option->names, option->name_count);
     fprintf(stderr, ", not \"%s\"", value);
     if (near) fprintf(stderr, "; did you mean %s?", near);
     fputc('\n', stderr);
@@ -380,7 +382,10 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
     optind = 0; // restarts getopt
     for (int code; (code = getopt_long(argument_count, arguments, letters, long_options, NULL)) != -1;) {
         if (code == 'h') return help_print(line);
-        if (code == '?') return EXIT_USER;
+        if (code == '?') {
+            if (line->usage) stderr_print("see glint %s --help", line->command);
+            return EXIT_USER;
+        }
         size_t i = 0;
         while (long_options[i].val != code)
             i++;

@@ -96,7 +96,7 @@ static bool devices_print(const DeviceList *list, const Device *chosen, const Re
     const bool is_written = report_output(devices_json(list, chosen), report, device_notes, list);
     if (!report_has_text(report)) return is_written;
     if (list->empty_platform_count > 0)
-        printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
+        printf("%u of %u platforms have no device\n", list->empty_platform_count, list->platform_count);
     for (size_t i = 0; i < list->count; i++)
         passports_print(&list->items[i]);
     return is_written;

@@ -31,13 +31,13 @@ const Option size_option[] = {{"size", "WxH",
                                option_size, FIELD(size)}};
 const Option device_option[] = {
     {"device", "D",
-     "the device: its index, part of its name, its PCI address, cpu or gpu (default: GLINT_DEVICE, else a "
-     "GPU, else a CPU)",
+     "the device: its index, part of its name, its PCI address, UUID, cpu or gpu (default: GLINT_DEVICE, "
+     "else a GPU, else a CPU)",
      option_text, FIELD(device)}};
 const Option devices_option[] = {
     {"device", "LIST",
-     "all, or a comma-separated list of indices, parts of names, PCI addresses, cpu or gpu (default: "
-     "GLINT_DEVICE, else a GPU, else a CPU)",
+     "all, or a comma-separated list of indices, parts of names, PCI addresses, UUIDs, cpu or gpu "
+     "(default: GLINT_DEVICE, else a GPU, else a CPU)",
      option_text, FIELD(device)}};
 const Option reference_option[] = {
     {"reference-device", "D",

@@ -107,6 +107,8 @@ static const char *display_check(const RenderOptions *options)
     const ImageFormat format = output_format(options);
     if (is_changed && image_format_holds_floats(format))
         return "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values";
+    if (output->bits != 8 && image_format_holds_floats(format))
+        return "--bits is for PNG and PPM; EXR and NPY hold floats";
     if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
         return "--alpha is for PNG and EXR; other formats need --aov coverage,backdrop";
     if (output->dither && output->bits != 8) return "--dither cannot be combined with --bits 16";
@@ -156,7 +158,9 @@ static bool frames_count(RenderOptions *options)
         message_list_free(&messages); // the warnings, which the first frame's scene repeats
         options->frame_count = scene.animation.frame_count;
         if (scene.animation.frame_count == 0)
-            message_error(&messages, "--frames all: '%s' has no 'frames'; name them, such as 0-47", path);
+            message_error(&messages,
+                          "--frames all needs 'frames' in '%s'; or give a range, such as --frames 0-47",
+                          path);
     }
     messages_print(&messages, path);
     return is_read && options->frame_count > 0;

@@ -189,7 +189,8 @@ bool cache_load(const char *key, Text *binary, WarningReceiver *warnings)
         utimensat(folder, name.text, NULL, 0); // most recently used
     } else if (why && why != absent) {
         OWNED char *path = cache_entry_path(key);
-        message_warning(&messages, "the cached kernel '%s' is not used: %s", path, why);
+        message_warning(&messages, "the kernel is rebuilt, since the cached '%s' cannot be used: %s", path,
+                        why);
     }
     text_free(&entry.content);
     warnings_deliver(warnings, &messages);

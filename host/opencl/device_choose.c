@@ -93,13 +93,17 @@ static void advice_write(Text *text, const DeviceList *list)
 
 static void no_match_report(const DeviceList *list, const char *selector, MessageList *messages)
 {
+    const char *variable = getenv("GLINT_DEVICE");
     OWNED char *failure = device_list_failure_text(list);
     OwnedText text = {0};
     if (list->count == 0)
         text_appendf(&text, "no OpenCL device on %u platform%s", list->platform_count,
                      text_plural(list->platform_count));
+    else if (selector && selector[0] == '\0')
+        text_appendf(&text, "the name of a device is empty");
     else if (selector)
-        text_appendf(&text, "no usable device matches \"%s\"", selector);
+        text_appendf(&text, "no usable device matches %s\"%s\"",
+                     variable && strcmp(variable, selector) == 0 ? "GLINT_DEVICE " : "", selector);
     else
         text_appendf(&text, "no usable device");
     if (failure) text_appendf(&text, " (%s)", failure);

@@ -232,7 +232,10 @@ static void refusal_report(const char *path, const char *key, const char *found,
     const char *found_key = found + sizeof header;
     OwnedText head = head_of(found_key);
     if (memcmp(header.magic, file_magic, sizeof header.magic) != 0 || header.format != file_format)
-        message_error(messages, "'%s' is not a checkpoint of this version of glint", path);
+        message_error(messages,
+                      "'%s' is not a checkpoint of this version of glint; delete it, or pass another file to "
+                      "--checkpoint",
+                      path);
     else if (memcmp(found, head.items, head.count) != 0)
         damage_report(path, messages);
     else
