@@ -20,7 +20,7 @@ RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_
 
 static void ratio_append(Text *notes, const char *of_what, const Comparison *result)
 {
-    text_appendf(notes, "    new over old %s time: %.3f", of_what, result->ratio);
+    text_appendf(notes, "    new/old %s time %.3f", of_what, result->ratio);
     if (isfinite(result->high)) text_appendf(notes, " (%.3f to %.3f)", result->low, result->high);
     switch (result->verdict) {
     case VERDICT_UNDECIDED:
@@ -54,7 +54,7 @@ int comparisons_status(const RowComparison *comparisons, size_t count, const cha
         counts[comparisons[i].verdict]++;
     }
     if (compared == 0) {
-        stderr_print("%s has none of these rows", other);
+        stderr_print("%s has no row of these scenes and options, so nothing was compared", other);
         return EXIT_USER;
     }
     if (counts[VERDICT_SLOWER] > 0) {

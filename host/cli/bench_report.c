@@ -20,7 +20,7 @@ const ResultTable bench_table = {
                "kernel ms=kernel_ms.median", "kernel min=kernel_ms.min", "kernel max=kernel_ms.max",
                "old frame ms=against_frame_ms.median", "processor ms=processor_ms", "runs=frame_ms.runs",
                "Mrays/s=mrays_per_s", "cold build ms=build_ms.cold", "cached build ms=build_ms.cached",
-               "mJ=energy.frame_mj", "over first=to_first"},
+               "mJ=energy.frame_mj", "ratio to first=to_first"},
     .extras = {"clock", "drift=drift.verdict", "verdict=comparison.verdict", "new over old=comparison",
                "kernel=kernel_hash", "reason"},
     .verdicts = {"comparison.verdict"},
@@ -33,9 +33,9 @@ static void launches_append(Text *notes, const RenderReport *report)
 {
     for (size_t i = 0; i < report->launches.count; i++) {
         const LaunchTime *time = &report->launches.items[i].time;
-        text_appendf(notes, "    %-9s %9.3f ms, by the host %9.3f ms%s%s\n", report->launches.items[i].name,
-                     1e3 * time->event_seconds, 1e3 * time->host_seconds, time->fault ? "; " : "",
-                     time->fault ? time->fault : "");
+        text_appendf(notes, "    %-9s %9.3f ms on the device, %9.3f ms by the host's clock%s%s\n",
+                     report->launches.items[i].name, 1e3 * time->event_seconds, 1e3 * time->host_seconds,
+                     time->fault ? "; " : "", time->fault ? time->fault : "");
     }
 }
 

@@ -38,7 +38,7 @@ static double launch_delay(const LaunchTime *time)
 
 static void line_print(const char *what, double seconds, const char *remark)
 {
-    fprintf(stderr, "  %-10s %10.3f ms  %s\n", what, 1e3 * seconds, remark);
+    fprintf(stderr, "  %-10s %10.3f ms%s%s\n", what, 1e3 * seconds, remark[0] ? "  " : "", remark);
 }
 
 static void launches_print(const char *what, const NamedLaunch *launches, size_t count)
@@ -144,7 +144,7 @@ static void text_print(const ImageOrigin *origin, const HostTimes *host)
                 rank->lanes[PASS_ALL], text_plural(rank->lanes[PASS_ALL]));
         share_print(&ranks->remote.shares[i], settings);
     }
-    line_print("render", host->render_seconds, "");
+    line_print("rendering", host->render_seconds, "in all, from flatten to read-back");
     line_print("encode", host->encode_seconds, "");
 }
 
