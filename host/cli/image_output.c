@@ -315,7 +315,9 @@ static void names_print(const ImageOutput *output)
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
     ImageWriter **writers = output->writers;
-    bool whole = kept_write(output, messages) && bands_written(output) && late_notes_write(output, messages);
+    const bool is_kept = kept_write(output, messages);
+    bool whole =
+        bands_written(output) && is_kept && late_notes_write(output, messages); // joins the writers first
     const double start = clock_seconds();
     for (size_t i = 0; i < COUNT_OF(output->writers) && whole; i++)
         whole = !writers[i] || image_writer_finish(writers[i], messages);
