@@ -76,6 +76,16 @@ class Golden(TestCase):
                 if part:
                     self.assertIn(f"at {part}", out)
 
+    def test_crop_of_display_values(self):
+        """The colors of .rt scenes are those of the screen, without a transfer curve."""
+        scene = "A 1 255,255,255\nC 0,0,0 0,0,1 60\nL 0,9,0 0 255,255,255\npl 0,0,5 0,0,-1 {}\n"
+        write("wall.rt", scene.format("10,10,10"))
+        self.glint("golden write wall.rt --size 24x16")
+        write("wall.rt", scene.format("200,100,50"))
+        self.glint("golden check", status=3)
+        (width, height, *_), rows, *_ = png_read("wall.rt-golden.png")
+        self.assertEqual(rows[1:4], bytes([200, 100, 50]), (width, height))
+
     def test_every_part_of_a_line_counts(self):
         """A changed digit of any layer's hash is reported as a difference of that layer, although the scene is the same."""
         line = self.written()

@@ -136,7 +136,7 @@ static uint16_t tile_hash(const Film *film, PixelBox box)
 }
 
 // Writes the box of the image as SCENE-golden.png. Returns NULL with a message if that fails.
-static char *crop_write(const Film *film, const char *scene, PixelBox box)
+static char *crop_write(const Film *film, const char *scene, Transfer transfer, PixelBox box)
 {
     const uint32_t width = box.right - box.left, height = box.bottom - box.top;
     const size_t row_values = 3 * (size_t)width;
@@ -148,8 +148,13 @@ static char *crop_write(const Film *film, const char *scene, PixelBox box)
         const size_t y = box.top + i / row_values;
         pixels[i] = (float)film->color[3 * (y * film->width + box.left) + i % row_values];
     }
-    const ImageHeader header = {
-        .format = IMAGE_PNG, .width = width, .height = height, .channels = 3, .bits = 8, .npy_type = 'f'};
+    const ImageHeader header = {.format = IMAGE_PNG,
+                                .width = width,
+                                .height = height,
+                                .channels = 3,
+                                .bits = 8,
+                                .transfer = transfer,
+                                .npy_type = 'f'};
     PrintedMessages messages = {0};
     return image_write(path, &header, pixels, &messages) ? memory_release(&path) : NULL;
 }
@@ -171,7 +176,7 @@ static void lines_compare(GoldenCheck *check, const GoldenLine *golden, const Go
         if (tile.right > check->box.right) check->box.right = tile.right;
         if (tile.bottom > check->box.bottom) check->box.bottom = tile.bottom;
     }
-    if (check->tile_count > 0) check->crop = crop_write(film, check->scene, check->box);
+    if (check->tile_count > 0) check->crop = crop_write(film, check->scene, now->transfer, check->box);
 }
 
 // Renders a scene with the settings of `golden`, and sets its hashes. Returns EXIT_DONE or the exit status of
@@ -197,6 +202,7 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
         status = is_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     if (status == EXIT_DONE) {
         golden->scene_hash = renderer_scene_hash(renderer);
+        golden->transfer = scene.color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
         for (size_t i = 0; i < HASHED_COUNT; i++)
             golden->hashes[i] = layer_hash(film, hashed_layers[i]);
         for (uint32_t i = 0; i < TILES; i++)

@@ -3,6 +3,7 @@
 
 #include "host/base/array.h"
 #include "host/base/text.h"
+#include "host/image/image.h"
 #include "host/render/film.h"
 
 enum { TILE_COLUMNS = 12, TILE_ROWS = 8, TILES = TILE_COLUMNS * TILE_ROWS };
@@ -17,6 +18,7 @@ typedef struct {
     uint32_t width, height, samples, bounces;
     uint64_t scene_hash, hashes[HASHED_COUNT];
     uint16_t tiles[TILES];
+    Transfer transfer; // of the colors of a scene that was rendered; it is not in the file
 } GoldenLine;
 
 typedef struct {
