@@ -29,6 +29,13 @@ TEST(distance_in_ulp)
     assert_true(isinf(ulp_distance(inf, -inf, true)) && isinf(ulp_distance(1, nan, true)));
 }
 
+TEST(errors_of_what_is_not_finite)
+{
+    const double inf = (double)INFINITY, nan = (double)NAN;
+    assert_true(value_error(inf, inf) == 0 && value_error(nan, nan) == 0);
+    assert_true(isinf(value_error(inf, -inf)) && isinf(value_error(nan, inf)) && isinf(value_error(1, nan)));
+}
+
 TEST(summary_of_nothing)
 {
     assert_int_equal(error_summarize(NULL, NULL, 0).count, 0);

@@ -20,10 +20,15 @@ static size_t value_count(const Image *image)
     return pixel_count(image) * image->channels;
 }
 
+static bool is_same_number(double a, double b)
+{
+    return a == b || (isnan(a) && isnan(b));
+}
+
 double value_error(double reference, double test)
 {
     if (isfinite(reference) && isfinite(test)) return fabs(test - reference);
-    return isfinite(reference) || isfinite(test) ? INFINITY : 0;
+    return is_same_number(reference, test) ? 0 : INFINITY;
 }
 
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count)
@@ -169,11 +174,6 @@ static void light_compare(ImageMetrics *metrics, const Image *reference, const I
     }
     metrics->worst_x = (uint32_t)(worst % reference->width);
     metrics->worst_y = (uint32_t)(worst / reference->width);
-}
-
-static bool is_same_number(double a, double b)
-{
-    return a == b || (isnan(a) && isnan(b));
 }
 
 double ulp_distance(double expected, double found, bool is_double)

@@ -15,7 +15,8 @@ typedef struct {
     double rel_mse;
 } ErrorSummary;
 
-// Returns the absolute difference of two values. It is infinite if only one is finite, and 0 if neither is.
+// Returns the absolute difference of two values. It is infinite if one is not finite, unless both are NaN or
+// the same infinity.
 double value_error(double reference, double test);
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count);
 
