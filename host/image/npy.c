@@ -134,8 +134,8 @@ static bool npy_dictionary_decode(Image *image, const ImageFile *file, const cha
         if (image->doubles) image->doubles[i] = value;
         image->values[i] = (float)value;
     }
-    image->data = image->channels != 3;
     image->integers = type == NPY_UINT32 || type == NPY_UINT8;
+    image->data = image->integers || image->channels != 3;
     return true;
 }
 

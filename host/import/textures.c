@@ -89,6 +89,7 @@ static char *image_problem(const Image *image, size_t texel_count)
         return text_format("has a side of more than %d texels", TEXTURE_SIDE_MAX);
     if ((size_t)image->width * image->height > TEXELS_MAX - texel_count)
         return text_format("brings the scene's textures to more than %d texels in total", TEXELS_MAX);
+    if (image->integers) return text_format("is an array of integers; a texture needs the type <f4 or <f8");
     return colors_are_finite(image) ? NULL : text_format("has a color that is not finite");
 }
 
