@@ -135,6 +135,13 @@ size_t message_count(const MessageList *list, MessageSeverity severity)
     return count;
 }
 
+const char *message_first_error(const MessageList *list)
+{
+    for (size_t i = 0; i < list->count; i++)
+        if (list->items[i].severity == MESSAGE_ERROR) return list->items[i].text;
+    return "";
+}
+
 // Appends the line's tabs before the caret, which keep it under its character at any tab width.
 static void caret_append(Text *text, const char *line, unsigned column)
 {

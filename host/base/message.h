@@ -49,6 +49,8 @@ char *message_place_text(const Source *source, size_t offset);
 const Source *source_at(const Source *source, size_t *offset);
 
 size_t message_count(const MessageList *list, MessageSeverity severity);
+// Returns the text of the first error, or "" if there is none.
+const char *message_first_error(const MessageList *list);
 
 // Prints `file:line:column: error: text`, then the line and a caret where they are known.
 void message_list_print(const MessageList *list, FILE *stream);

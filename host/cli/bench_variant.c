@@ -48,8 +48,9 @@ static bool build_try(Compute *compute, const Variant *variant, bool no_cache, d
 static bool passports_acquire(Compute *compute, const Variant *variant, MessageList *messages)
 {
     Renderer *renderer = renderer_open_empty(compute, &variant->settings, NULL, messages);
+    const bool is_fit = renderer != NULL;
     renderer_close(renderer);
-    return renderer != NULL;
+    return is_fit;
 }
 
 static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
@@ -120,8 +121,8 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
         const RenderReport *report = renderer_report(variant->renderer);
         row->traverses_bvh = (report->features & FEATURE_BVH) != 0;
     } else {
-        row->failure =
-            memory_copy_text(messages.count > 0 ? messages.items[messages.count - 1].text : "unknown");
+        const char *error = message_first_error(&messages);
+        row->failure = memory_copy_text(error[0] != '\0' ? error : "the device failed");
     }
     variant_copy_failure(variant);
 }

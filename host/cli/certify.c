@@ -173,9 +173,9 @@ static int precision_compare(Certification *certification, RenderSettings settin
     CertifyRow *row = &certification->rows[precision];
     MessageList messages = {0};
     Renderer *renderer = renderer_open(certification->compute, certification->scene, &settings, &messages);
-    const bool is_unfit = !renderer && messages.count > 0;
+    const bool is_unfit = !renderer && message_count(&messages, MESSAGE_ERROR) > 0;
     if (is_unfit && !certification->options->common.precisions) {
-        row->failure = memory_copy_text(messages.items[0].text);
+        row->failure = memory_copy_text(message_first_error(&messages));
         message_list_free(&messages);
         return EXIT_DONE;
     }

@@ -35,14 +35,6 @@ typedef struct {
     Rank self;
 } RankRenderer;
 
-// Returns the text of the first error, or "" if there is none.
-static const char *first_error(const MessageList *messages)
-{
-    for (size_t i = 0; i < messages->count; i++)
-        if (messages->items[i].severity == MESSAGE_ERROR) return messages->items[i].text;
-    return "";
-}
-
 static void device_close_quietly(RankRenderer *worker)
 {
     renderer_close(worker->renderer);
@@ -65,7 +57,7 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         const Device *device =
             device_choose_numbered(&worker->device.devices, selector, worker->local_rank, &worker->messages);
         if (!device) {
-            snprintf(self->failure, sizeof self->failure, "%s", first_error(&worker->messages));
+            snprintf(self->failure, sizeof self->failure, "%s", message_first_error(&worker->messages));
             device_list_close(&worker->device.devices);
             return;
         }
@@ -108,7 +100,7 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
         .acquire = rows_acquire, .deliver = band_send, .has_ended = end_poll, .context = &has_ended};
     const Compute *compute = &worker->device.compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
-    snprintf(failure, sizeof failure, "%s", first_error(&worker->messages));
+    snprintf(failure, sizeof failure, "%s", message_first_error(&worker->messages));
     if (failure[0] == '\0' && !compute_ok(compute)) {
         OWNED char *text = compute_failure_text(compute);
         snprintf(failure, sizeof failure, "%s", text);
