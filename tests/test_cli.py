@@ -55,6 +55,7 @@ WRONG_COMMAND_LINES = [
     ("notes: the name of a scene must end in", "{render|} notes"),
     ('unknown command "folder"', "folder"),
     (r"one scene, but 'b\.yaml' is a second", "trace --rays rays sphere.yaml b.yaml"),
+    ("cannot both be read from standard input", "trace - --rays -"),
     ("the output is CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o {image.jpg|image.PNGX|image.|folder}"),

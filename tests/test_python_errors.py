@@ -82,6 +82,8 @@ class Errors(unittest.TestCase):
         for wrong in ({"samples": (1 << 32) + 1}, {"lanes": (1 << 32) + 4}):
             with self.assertRaisesRegex(ValueError, "expected 0 to 4294967295"):
                 scene.render(8, 6, **wrong)
+        with self.assertRaisesRegex(ValueError, "samples: expected 1 to 1048576, not 0"):
+            scene.render(8, 6, samples=0)
 
     def test_warnings(self):
         with warnings.catch_warnings(record=True) as caught:

@@ -31,6 +31,8 @@ static const char *options_check(void *trace_options)
 {
     const TraceOptions *options = trace_options;
     if (!options->rays) return "no rays given; use --rays FILE";
+    if (strcmp(options->scene, "-") == 0 && strcmp(options->rays, "-") == 0)
+        return "the scene and the rays cannot both be read from standard input";
     if (image_format_of(options->output) != IMAGE_UNKNOWN)
         return "the output is CSV; its name must not end in that of an image or array, such as .png or .npy";
     return NULL;

@@ -86,7 +86,7 @@ bool dat_camera(DatReader *reader)
 
 bool dat_background(DatReader *reader)
 {
-    return line_vector(&reader->line, "background", NULL, &reader->scene->background);
+    return line_vector(&reader->line, "background", &range_not_negative, &reader->scene->background);
 }
 
 static bool fading_read(DatReader *reader, Light *light)

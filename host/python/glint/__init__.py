@@ -211,6 +211,8 @@ class Scene:
         unknown = set(layers) - set(LAYERS)
         if unknown:
             raise ValueError(f"layers: expected some of {', '.join(LAYERS)}, not {', '.join(sorted(unknown))}")
+        if samples < 1:
+            raise ValueError(f"samples: expected 1 to 1048576, not {samples}")
         counts = (_h.uint32(name, value) for name, value in (("width", width), ("height", height), ("samples", samples), ("bounces", bounces)))
         settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _h.uint32("lanes", lanes),
                                      min_contribution=min_contribution)
