@@ -177,11 +177,10 @@ static void folder_remove(const char *path)
 static char *steps_folder_create(MessageList *messages)
 {
     const char *parent = getenv("TMPDIR");
-    char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
-    if (mkdtemp(folder)) return folder;
-    message_error(messages, "cannot create the folder '%s': %s", folder, strerror(errno));
-    free(folder);
-    return NULL;
+    OWNED char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
+    char *absolute = mkdtemp(folder) ? realpath(folder, NULL) : NULL; // as the caches' variables must be
+    if (!absolute) message_error(messages, "cannot create the folder '%s': %s", folder, strerror(errno));
+    return absolute;
 }
 
 // Writes the versions and the scene that glint bench renders. Returns false with a message on failure.
