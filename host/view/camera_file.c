@@ -269,7 +269,6 @@ bool camera_replace(Text *text, const Source *source, const Camera *camera, cons
     if (!camera_file_read(&file, source, frame, messages)) return false;
     Copy copy = {.source = source, .text = text};
     bool replaced = values_replace(&copy, &file, camera, frame);
-    report_close(&file.reader.report);
     camera_file_free(&file);
     if (!replaced) text_free(text);
     return replaced;
