@@ -26,6 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(os.environ.get("GLINT", ROOT / "build/glint")).resolve()
 BUILD = Path(os.environ.get("BUILD", PROGRAM.parent))
+FAULTS_LIBRARY = BUILD.resolve() / "tests/faults.so"  # before a test changes the folder
 IS_SANITIZED = BUILD.name.endswith("-sanitize")
 IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
 # SPHERE, PLANET and BALLS have the same features, so that the same kernels serve the tests of each.
@@ -107,7 +108,7 @@ def preloaded(*libraries, **variables):
 
 def faults(rules):
     """Returns an environment in which calls fail by rules (tests/failing/faults.h)."""
-    return preloaded(BUILD.resolve() / "tests/faults.so", GLINT_FAULTS=rules)
+    return preloaded(FAULTS_LIBRARY, GLINT_FAULTS=rules)
 
 
 def need_device():

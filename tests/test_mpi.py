@@ -14,7 +14,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import BUILD, IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TWO, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
+from glint import BUILD, FAULTS_LIBRARY, IS_LONG, IS_SANITIZED, POCL, PROGRAM, ROOT, SPHERE, TWO, TestCase, checkpoint_rows, file_size, main, need_pocl, plain, png_read, read, shim_build, skip_all, write
 
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
               "OMPI_MCA_mpi_yield_when_idle": "1",  # ranks that wait leave the processor to other tests
@@ -104,7 +104,7 @@ FAILING = {"GLINT_FAULTS": "'clEnqueueNDRangeKernel fail'"}
 def faulty(variables):
     """Returns the start of a command of a rank with these faults."""
     texts = " ".join(f"{name}={value}" for name, value in variables.items())
-    return f"env LD_PRELOAD='{BUILD.resolve()}/tests/faults.so ./ranks.so' {texts} {RANKS}"
+    return f"env LD_PRELOAD='{FAULTS_LIBRARY} ./ranks.so' {texts} {RANKS}"
 
 
 def environment():

@@ -101,7 +101,7 @@ class Window:
         # the libraries that SDL loads and unloads leak
         sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0:verify_asan_link_order=0"
         variables = os.environ | {
-            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer, **environment}
+            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", **environment, "ASAN_OPTIONS": sanitizer}
         self.process = subprocess.Popen(
             command, env=variables, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.reader = threading.Thread(target=self.read, daemon=True)
