@@ -356,7 +356,7 @@ class SceneFormat(TestCase):
 
     def test_shapes_are_named(self):
         write("shape.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nobjects: [{x: {}}]\n")
-        shapes = self.refuses("check shape.yaml", "there is no shape 'x'").stderr.partition("the choices are ")[2].splitlines()[0].split(", ")
+        shapes = self.refuses("check shape.yaml", "unknown shape 'x'").stderr.partition("the choices are ")[2].splitlines()[0].split(", ")
         self.assertGreaterEqual(len(shapes), 13)
         for shape in shapes:
             self.assertIn(f"\n| `{shape}` | ", self.page)

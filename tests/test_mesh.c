@@ -209,9 +209,8 @@ TEST(scene_file_faults_are_reported)
     REFUSED("{file: a.obj, transform: {scale: [1, 0, 1]}}", "4:44: error: 'scale' must not be zero\n");
     REFUSED("{file: a.obj, transform: {rotate: 90}}",
             "4:45: error: 'rotate' must be three numbers, not '90'\n");
-    REFUSED(
-        "{file: a.obj, transform: {turn: 90}}",
-        "4:37: error: there is no transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
+    REFUSED("{file: a.obj, transform: {turn: 90}}",
+            "4:37: error: unknown transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
 }
 
 TEST(ids_count_the_triangles)

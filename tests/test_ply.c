@@ -173,9 +173,8 @@ TEST(faults_name_line_and_row)
         {ASCII "element vertex 4\n" XYZ "element face 1\nproperty list uchar float texcoord\n"
                "property list uchar int vertex_index\n" END CORNERS "6 0 0 1 0 0 1 1 0\n",
          "15:18: error: face 0 (counted from 0) has 1 corner, but 3 texture coordinates"},
-        {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: there is no PLY type 'int64'"},
-        {ASCII "element vertex 4\nproperty list uchar half x\n" END,
-         "4:21: error: there is no PLY type 'half'"},
+        {ASCII "element vertex 4\nproperty int64 x\n" END, "4:10: error: unknown PLY type 'int64'"},
+        {ASCII "element vertex 4\nproperty list uchar half x\n" END, "4:21: error: unknown PLY type 'half'"},
         {ASCII "element vertex 4\nproperty float\n" END, "4:15: error: the property has no name"},
         {ASCII XYZ END, "3:9: error: a property must follow an element"},
         {ASCII "element vertex -4\n" END, "3:16: error: the number of 'vertex' must be whole, not '-4'"},
@@ -184,7 +183,7 @@ TEST(faults_name_line_and_row)
         {ASCII "element vertex 4\n" XYZ
                "element tristrips 1\nproperty list int int vertex_indices\n" END CORNERS "4 0 1 2 3\n",
          "7:9: error: strips of triangles (tristrips) are not supported; export the mesh with faces"},
-        {"ply\nformat binary 1.0\n" END, "2:8: error: there is no PLY format 'binary'"},
+        {"ply\nformat binary 1.0\n" END, "2:8: error: unknown PLY format 'binary'"},
         {"ply\nelement vertex 0\n" END, "3:1: error: the header lacks a line 'format'"},
         {"solid\n", "1:1: error: a PLY file must start with a line 'ply'"},
         {"", "1:1: error: a PLY file must start with a line 'ply'"},

@@ -57,7 +57,7 @@ class Images(TestCase):
         self.glint(f"render whole.yaml --frames 1 {SMALL} -o b%d.ppm")
         self.assertSameBytes("a1.ppm", "b1.ppm")
         write("bad.yaml", camera.replace("fov", "fow"))
-        self.refuses("render objects.yaml --camera bad.yaml", "^bad.yaml:1:[0-9]+: error: there is no camera key 'fow'")
+        self.refuses("render objects.yaml --camera bad.yaml", "^bad.yaml:1:[0-9]+: error: unknown camera key 'fow'")
         self.refuses("render whole.yaml --camera shot.yaml --set camera.fov=9", "--set camera.fov=9 cannot change the camera, which is that of 'shot.yaml'")
         self.refuses("render objects.yaml --camera -", "--camera: expected the name of a file")
         write("far.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0], height: 1e30, shift: [1e30, 0]}\n")

@@ -201,7 +201,7 @@ TEST(losses)
           "7:128: warning: texfunc 1 is not supported; the color is used\n"
           "8:96: warning: texfunc 9 is not supported; the color is used\n");
     WARNS("sphere center 0 0 0 rad 1 unknown\nsphere center 0 0 0 rad 1 unknown\n",
-          "7:27: warning: there is no texture 'unknown'; white is used\n");
+          "7:27: warning: unknown texture 'unknown'; white is used\n");
     WARNS("sphere center 0 0 0 rad 0 " TEXTURE "fcylinder base 0 0 0 apex 0 0 0 rad 1 " TEXTURE
           "plane center 0 0 0 normal 0 0 0 " TEXTURE,
           "7:1: warning: a sphere without size or direction is not shown\n"

@@ -216,7 +216,7 @@ TEST(messages_name_the_included_file)
         "scene.yaml", (const char *[]){"ambient=-1"}, 1,
         "scene.yaml:7:19: error: the sphere lacks 'center'\n"
         "scene.yaml:7:19: error: the sphere lacks 'radius'\n"
-        "parts/a.yaml:4:1: error: there is no scene key 'purple'; the choices are include, "
+        "parts/a.yaml:4:1: error: unknown scene key 'purple'; the choices are include, "
         "camera, frames, fps, "
         "shutter, background, ambient, lights, materials, define, objects\n"
         "--set:1:9: error: 'ambient' must be 0 or more, not '-1'\n"

@@ -130,7 +130,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     while (key < KEY_COUNT && !((block->keys >> key & 1) && word_is(word, keys[key].name)))
         key++;
     if (key == KEY_COUNT)
-        return report_error(&reader->report, word.offset, "there is no %s key '%.*s'", block->name,
+        return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
                             WORD_TEXT(word));
     if (*seen >> key & 1)
         return report_error(&reader->report, word.offset, "'%s' is given twice", keys[key].name);
@@ -195,7 +195,7 @@ static const Block *block_find(CfgReader *reader)
     for (size_t i = 0; i < COUNT_OF(blocks); i++) {
         if (word_is(name, blocks[i].name)) return line_end(&reader->line) ? &blocks[i] : NULL;
     }
-    report_error(&reader->report, name.offset, "there is no block '%.*s'", WORD_TEXT(name));
+    report_error(&reader->report, name.offset, "unknown block '%.*s'", WORD_TEXT(name));
     return NULL;
 }
 

@@ -176,7 +176,7 @@ static void statement_read(void *context)
     const Word word = value_word(&reader->line);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
-        report_error(&reader->report, word.offset, "there is no statement '%.*s'", WORD_TEXT(word));
+        report_error(&reader->report, word.offset, "unknown statement '%.*s'", WORD_TEXT(word));
     } else if (statements[index].read) {
         if (statements[index].read(reader)) return;
     } else {

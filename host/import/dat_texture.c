@@ -136,7 +136,7 @@ static bool texture_key_read(DatReader *reader, Word word, Texture *texture)
     if (word_is_in_any_case(word, "outline")) return outline_read(reader, "outline");
     if (word_is_in_any_case(word, "outline_width")) return outline_read(reader, "outline_width");
     if (!word.length) return report_error(&reader->report, word.offset, "the texture lacks its 'texfunc'");
-    return report_error(&reader->report, word.offset, "there is no texture key '%.*s'", WORD_TEXT(word));
+    return report_error(&reader->report, word.offset, "unknown texture key '%.*s'", WORD_TEXT(word));
 }
 
 bool dat_texture_body(DatReader *reader, Material *material)
@@ -179,7 +179,7 @@ static uint32_t named_texture_find(DatReader *reader, Word name)
 {
     NamedTexture **known = tfind(&(NamedTexture){.name = name}, &reader->textures, named_textures_compare);
     if (known) return (*known)->material;
-    dat_warn(reader, name.offset, "there is no texture '%.*s'; white is used", WORD_TEXT(name));
+    dat_warn(reader, name.offset, "unknown texture '%.*s'; white is used", WORD_TEXT(name));
     const Material white = dat_texture_default();
     const uint32_t material = scene_add_material(reader->scene, &white, "");
     named_texture_add(reader, name, material);

@@ -30,7 +30,7 @@ static bool projection_read(DatReader *reader)
         report_warning(&reader->report, name.offset,
                        "the fisheye projection is not supported; perspective is used");
     } else if (!word_is_in_any_case(name, "perspective")) {
-        return report_error(&reader->report, name.offset, "there is no projection '%.*s'", WORD_TEXT(name));
+        return report_error(&reader->report, name.offset, "unknown projection '%.*s'", WORD_TEXT(name));
     }
     return true;
 }

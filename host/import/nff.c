@@ -281,7 +281,7 @@ static void element_read(void *context)
         report_error(&reader->report, name.offset, "an element is expected, not the number %.*s",
                      WORD_TEXT(name));
     else
-        report_error(&reader->report, name.offset, "there is no element '%.*s'", WORD_TEXT(name));
+        report_error(&reader->report, name.offset, "unknown element '%.*s'", WORD_TEXT(name));
 }
 
 // Sets the intensities, which the format leaves unspecified. Its author proposes this formula for each of n

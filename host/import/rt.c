@@ -287,10 +287,10 @@ static void element_read(void *context)
         }
     }
     if (reader->lenient)
-        report_warning(&reader->report, name.offset, "there is no element '%.*s'; it is skipped",
+        report_warning(&reader->report, name.offset, "unknown element '%.*s'; it is skipped",
                        WORD_TEXT(name));
     else
-        report_error(&reader->report, name.offset, "there is no element '%.*s'; --lenient skips it",
+        report_error(&reader->report, name.offset, "unknown element '%.*s'; --lenient skips it",
                      WORD_TEXT(name));
 }
 

@@ -17,7 +17,7 @@ static bool format_line_read(PlyHeader *header, Line *line)
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (word_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           report_error(line->report, word.offset, "there is no PLY format '%.*s'", WORD_TEXT(word));
+           report_error(line->report, word.offset, "unknown PLY format '%.*s'", WORD_TEXT(word));
 }
 
 // Reads a count of at most 18 digits. No file has as many rows as a longer number.
@@ -61,7 +61,7 @@ static const PlyType *ply_type_named(Word word)
 static bool type_read(Line *line, Word word, const PlyType **type)
 {
     *type = ply_type_named(word);
-    return *type || report_error(line->report, word.offset, "there is no PLY type '%.*s'", WORD_TEXT(word));
+    return *type || report_error(line->report, word.offset, "unknown PLY type '%.*s'", WORD_TEXT(word));
 }
 
 static bool property_line_read(PlyHeader *header, Line *line)

@@ -83,7 +83,7 @@ bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, 
     const char *word = yaml_text(&reader->tree, node);
     OwnedText choices = {0};
     choices_describe(&choices, word, names);
-    return report_error(&reader->report, node->offset, "there is no %s '%.*s'%s", type, WORD_SHOWN, word,
+    return report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", type, WORD_SHOWN, word,
                         text_c(&choices));
 }
 

@@ -126,7 +126,7 @@ enum { NAMES_COMPARED_MAX = 1000 };
 size_t name_find(Names names, const char *name);
 // Appends the name that `word` may stand for, if any, and the list of names unless it is long.
 void choices_describe(Text *text, const char *word, Names names);
-// Reports `there is no type 'word'`, with a suggestion if a name is similar or means the same, and with the
+// Reports `unknown type 'word'`, with a suggestion if a name is similar or means the same, and with the
 // list of names unless it is long. Returns false.
 bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, Names names);
 // Reads a mapping with one key, such as `sphere: {…}`, which names a `type`. Sets *value to the key's value

@@ -282,8 +282,8 @@ static bool unknown_material_report(YamlReader *reader, const YamlNode *node)
     const char *text = yaml_text(&reader->tree, node), *quote = text[0] == '#' ? "'" : "";
     if (is_color_text(text))
         return report_error(&reader->report, node->offset,
-                            "there is no material '%s'; for the color, write {color: %s%s%s}", text, quote,
-                            text, quote);
+                            "unknown material '%s'; for the color, write {color: %s%s%s}", text, quote, text,
+                            quote);
     const Names names = {reader->names.items, reader->names.count, sizeof(MaterialName)};
     return unknown_report(reader, node, "material", names);
 }
